@@ -1,0 +1,124 @@
+"""Takes: recorded bodies, and fingers where they were captured, read from any supported file into one value.
+
+All takes are in the project frame: right-handed, Y up, metres, seconds, quaternions xyzw. The bodies `left_wrist`
+and `right_wrist` are the wrist frames of `manipnet.hand.skeleton`: the right one as it is, the left one mirrored.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manipnet.geometry import mirror_points, mirror_poses, mirror_quats, quat_multiply, quat_rotate
+from manipnet.hand.skeleton import BONE_COUNT, JOINT_NAMES, OFFSETS_M, PARENTS
+from manipnet_tools.bvh import Bvh, BvhError, read_bvh
+
+Array = NDArray[np.float64]
+
+SIDES = ("left", "right")
+DECIMETRE_M = 0.1
+
+
+class TakeError(ValueError):
+    """A take that cannot be read; the text names the file, the place and what was expected."""
+
+
+@dataclass(frozen=True)
+class BodyTrack:
+    """One tracked body: world poses `(T, 7)` (position, quaternion) and whether it was seen, `(T,)`."""
+
+    poses: Array
+    tracked: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Fingers:
+    """Captured fingers of one hand, in the world: joints `(T, 22, 3)` and bone rotations `(T, 17, 4)`."""
+
+    positions: Array
+    rotations: Array
+
+
+@dataclass(frozen=True)
+class Take:
+    """A recorded performance: `time_s` `(T,)` from zero, bodies by name, captured fingers by side."""
+
+    name: str
+    rate_hz: float
+    time_s: Array
+    bodies: dict[str, BodyTrack]
+    fingers: dict[str, Fingers] = field(default_factory=dict)
+
+    @property
+    def objects(self) -> tuple[str, ...]:
+        """Names of the bodies that are not wrists."""
+        return tuple(name for name in self.bodies if name not in ("left_wrist", "right_wrist"))
+
+
+def read_take(path: Path | str) -> Take:
+    """Read a take: a folder of BVH files. Raises `TakeError`."""
+    path = Path(path)
+    if path.is_dir():
+        return read_bvh_folder(path)
+    if not path.exists():
+        raise TakeError(f"{path}: no such take")
+    raise TakeError(f"{path}: unknown kind of take; allowed are a folder of BVH files")
+
+
+def read_bvh_folder(folder: Path) -> Take:
+    """Read the ManipNet dataset's layout: `leftHand.bvh`, `rightHand.bvh`, one `<object>.bvh` per object."""
+    try:
+        files = {path.stem: read_bvh(path) for path in sorted(folder.glob("*.bvh"))}
+    except BvhError as error:
+        raise TakeError(str(error)) from None
+    missing = {"leftHand", "rightHand"} - files.keys()
+    if missing:
+        raise TakeError(
+            f"{folder}: no {' and no '.join(sorted(missing))}.bvh; a take needs both hands' files"
+        )
+    lengths = {stem: len(bvh.motion) for stem, bvh in files.items()}
+    rates = {round(1.0 / bvh.frame_time_s, 3) for bvh in files.values()}
+    if len(set(lengths.values())) > 1 or len(rates) > 1:
+        raise TakeError(
+            f"{folder}: files must share length and rate, found {lengths} frames at {sorted(rates)} Hz"
+        )
+    rate_hz = rates.pop()
+    fingers = {side: _hand(folder / f"{side}Hand.bvh", files.pop(f"{side}Hand"), side) for side in SIDES}
+    tracks = {
+        f"{side}_wrist": np.concatenate([hand.positions[:, 0], hand.rotations[:, 0]], axis=-1)
+        for side, hand in fingers.items()
+    }
+    tracks |= {stem: _root_poses(bvh) for stem, bvh in files.items()}
+    frames = len(tracks["left_wrist"])
+    seen = np.ones(frames, dtype=np.bool_)
+    bodies = {name: BodyTrack(poses, seen) for name, poses in tracks.items()}
+    return Take(folder.name, rate_hz, np.arange(frames) / rate_hz, bodies, fingers)
+
+
+def _root_poses(bvh: Bvh) -> Array:
+    """Poses `(T, 7)` of the root, from left-handed decimetres to the project frame."""
+    root = Bvh(bvh.joints[:1], bvh.frame_time_s, bvh.motion[:, : len(bvh.joints[0].channels)])
+    translations, rotations = root.local_transforms()
+    return mirror_poses(np.concatenate([DECIMETRE_M * translations[:, 0], rotations[:, 0]], axis=-1))
+
+
+def _hand(path: Path, bvh: Bvh, side: str) -> Fingers:
+    """World joints and bone rotations; the tips, which the files lack, come from the skeleton."""
+    names = [joint.name for joint in bvh.joints]
+    if names != list(JOINT_NAMES[:BONE_COUNT]):
+        raise TakeError(
+            f"{path}: joints must be {' '.join(JOINT_NAMES[:BONE_COUNT])}, found {' '.join(names)}"
+        )
+    translations, rotations = bvh.local_transforms()
+    translations, local = DECIMETRE_M * mirror_points(translations), mirror_quats(rotations)
+    tips = OFFSETS_M[BONE_COUNT:] if side == "right" else mirror_points(OFFSETS_M[BONE_COUNT:])
+    positions = np.empty((len(local), len(PARENTS), 3))
+    world = np.empty((len(local), BONE_COUNT, 4))
+    positions[:, 0], world[:, 0] = translations[:, 0], local[:, 0]
+    for j, parent in enumerate(PARENTS[1:], start=1):
+        offset = translations[:, j] if j < BONE_COUNT else tips[j - BONE_COUNT]
+        positions[:, j] = positions[:, parent] + quat_rotate(world[:, parent], offset)
+        if j < BONE_COUNT:
+            world[:, j] = quat_multiply(world[:, parent], local[:, j])
+    return Fingers(positions, world)
