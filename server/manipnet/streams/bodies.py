@@ -1,0 +1,195 @@
+"""Bodies in: the values every receiver produces, and the strict parser of msgpack and JSON messages.
+
+A message that cannot be trusted as a whole (wrong type, size, structure, time) raises `MessageError`. One bad
+pose in a good message does not cost the others their frame: that body comes out untracked, with the `fault`
+that says why.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+
+MAX_MESSAGE_BYTES = 65_536
+MAX_BODIES = 256
+MAX_NAME_CHARS = 128
+MAX_COORDINATE_M = 1_000.0
+MAX_TIME_S = 1e10
+"""Seconds up to the year 2286: a time beyond it was sent in milliseconds or nanoseconds."""
+
+_FLOATS = {float}
+
+FAULTS = ("nan", "bounds", "zero_quaternion")
+"""Why a pose is unusable: a number is not finite, a position is outside any stage, no rotation is given."""
+
+
+class MessageError(ValueError):
+    """A message that cannot be used; the text names what was wrong, where, and what is allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class BodySample:
+    """One body at one instant, in the project frame (right-handed, Y up, metres, xyzw).
+
+    `q` is a unit quaternion. Where `tracked` is false, `p` and `q` are not to be used. `fault` is one of
+    `FAULTS` when a pose was sent that nobody can use; such a body is untracked, at the origin, unrotated.
+    """
+
+    id: int | None
+    name: str | None
+    p: tuple[float, float, float]
+    q: tuple[float, float, float, float]
+    tracked: bool
+    fault: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BodyFrame:
+    """The bodies of one instant: `t_s` on the sender's clock, `t_received_s` on ours (`time.monotonic`).
+
+    `source` tells senders apart: its protocol, a colon, what is known of its address ("osc:10.0.0.7:50123").
+    """
+
+    t_s: float
+    frame: int | None
+    bodies: tuple[BodySample, ...]
+    t_received_s: float
+    source: str
+
+
+def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
+    """Read one msgpack map or JSON object of `docs/protocol-in.md`; raises only `MessageError`."""
+    message = _decode(payload)
+    if not isinstance(message, dict):
+        raise MessageError(f"message is {_kind(message)}; it must be a map with the keys t, frame and bodies")
+    t_s = _number(message, "t", "message")
+    if not abs(t_s) <= MAX_TIME_S:
+        raise MessageError(
+            f"t is {t_s}; it must be seconds, finite, at most {MAX_TIME_S:g} (no milliseconds)"
+        )
+    frame = message.get("frame")
+    if frame is not None and not _is_int(frame, 63):
+        raise MessageError(f"frame is {_show(frame)}; it must be an integer of at most 63 bits")
+    entries = message.get("bodies")
+    if not isinstance(entries, list):
+        raise MessageError(f"bodies is {_kind(entries)}; it must be a list of maps")
+    if len(entries) > MAX_BODIES:
+        raise MessageError(f"bodies has {len(entries)} entries; at most {MAX_BODIES} are allowed")
+    bodies = tuple([_body(entry, f"bodies[{i}]") for i, entry in enumerate(entries)])
+    check_distinct(bodies)
+    return BodyFrame(t_s, frame, bodies, t_received_s, source)
+
+
+def make_sample(
+    id: int | None, name: str | None, p: tuple[float, ...], q: tuple[float, ...], tracked: bool
+) -> BodySample:
+    """A sample with a unit quaternion from three and four floats, or an untracked one with its fault."""
+    fault = _fault(p, q)
+    if fault is None:
+        px, py, pz = p
+        x, y, z, w = q
+        n = 1.0 / math.hypot(x, y, z, w)
+        return BodySample(id, name, (px, py, pz), (x * n, y * n, z * n, w * n), tracked)
+    # A lost body is often sent as zeros or NaN: saying "lost" is no fault, claiming "tracked" with it is.
+    return BodySample(
+        id, name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), tracked=False, fault=fault if tracked else None
+    )
+
+
+def check_distinct(bodies: tuple[BodySample, ...]) -> None:
+    """Raise `MessageError` when two bodies of one frame share an id or a name."""
+    for key, values in ("id", [body.id for body in bodies]), ("name", [body.name for body in bodies]):
+        given = [value for value in values if value is not None]
+        if len(set(given)) < len(given):
+            twice = next(value for i, value in enumerate(given) if value in given[:i])
+            raise MessageError(f"bodies have the {key} {twice!r} twice; each body may appear once per frame")
+
+
+def check_name(name: object, where: str) -> str:
+    """A body name: 1 to `MAX_NAME_CHARS` printable characters, so it can be logged as it is."""
+    if not isinstance(name, str) or not 0 < len(name) <= MAX_NAME_CHARS or not name.isprintable():
+        allowed = f"1 to {MAX_NAME_CHARS} printable characters"
+        raise MessageError(f"{where} is {_show(name)}; it must be text of {allowed}")
+    return name
+
+
+def _decode(payload: bytes) -> Any:
+    if len(payload) > MAX_MESSAGE_BYTES:
+        raise MessageError(f"message has {len(payload)} bytes; at most {MAX_MESSAGE_BYTES} are allowed")
+    text = payload.lstrip(b" \t\r\n")
+    try:
+        if text.startswith((b"{", b"[")):
+            return json.loads(text.decode("utf-8"))
+        return msgpack.unpackb(payload, max_array_len=MAX_BODIES, max_map_len=MAX_BODIES)
+    except (ValueError, TypeError, OverflowError, RecursionError, msgpack.UnpackException) as error:
+        reason = str(error)[:120] or type(error).__name__
+        raise MessageError(f"message is neither a msgpack map nor a JSON object: {reason}") from None
+
+
+def _body(entry: object, where: str) -> BodySample:
+    if not isinstance(entry, dict):
+        raise MessageError(f"{where} is {_kind(entry)}; it must be a map with id or name, p and q")
+    id, name = entry.get("id"), entry.get("name")
+    if id is None and name is None:
+        raise MessageError(f"{where} has neither id nor name; at least one is needed")
+    if id is not None and not _is_int(id, 31):
+        raise MessageError(f"{where}.id is {_show(id)}; it must be an integer of at most 31 bits")
+    if name is not None:
+        check_name(name, f"{where}.name")
+    tracked = entry.get("tracked", True)
+    if not isinstance(tracked, bool):
+        raise MessageError(f"{where}.tracked is {_show(tracked)}; it must be true or false")
+    return make_sample(id, name, _numbers(entry, "p", 3, where), _numbers(entry, "q", 4, where), tracked)
+
+
+def _fault(p: tuple[float, ...], q: tuple[float, ...]) -> str | None:
+    if not math.isfinite(sum(p) + sum(q)):  # one sum costs less than seven tests; overflow is no pose either
+        return "nan"
+    if not -MAX_COORDINATE_M <= min(p) <= max(p) <= MAX_COORDINATE_M:
+        return "bounds"
+    return None if 1e-6 < math.hypot(*q) < math.inf else "zero_quaternion"
+
+
+def _numbers(entry: Mapping[str, Any], key: str, count: int, where: str) -> tuple[float, ...]:
+    values = entry.get(key)
+    if type(values) is not list or len(values) != count:
+        raise MessageError(f"{where}.{key} is {_show(values)}; it must be a list of {count} numbers")
+    if {*map(type, values)} == _FLOATS:
+        return tuple(values)
+    return tuple(_float(value, f"{where}.{key}[{i}]") for i, value in enumerate(values))
+
+
+def _number(entry: Mapping[str, Any], key: str, where: str) -> float:
+    if key not in entry:
+        raise MessageError(f"{where} has no {key}; it must be a number")
+    return _float(entry[key], key)
+
+
+def _float(value: object, where: str) -> float:
+    if type(value) is float:
+        return value
+    if type(value) is int and abs(value) < 1 << 1023:
+        return float(value)
+    raise MessageError(f"{where} is {_show(value)}; it must be a number")
+
+
+def _is_int(value: object, bits: int) -> bool:
+    return type(value) is int and -(1 << bits) <= value < 1 << bits
+
+
+def _kind(value: object) -> str:
+    return "missing" if value is None else type(value).__name__
+
+
+def _show(value: object) -> str:
+    """A short, printable picture of a hostile value: never a whole message in an error text."""
+    if isinstance(value, list | dict):
+        return f"a {type(value).__name__} of {len(value)}"
+    if isinstance(value, str | bytes) and len(value) > 40:
+        return f"{value[:40]!r}…"
+    if isinstance(value, int) and abs(value) >= 1 << 64:
+        return "a huge integer"
+    return "missing" if value is None else repr(value)
