@@ -30,7 +30,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Bvh:
-    """Hierarchy and motion. `motion` `(T, C)`: all channels in file order, in degrees and the file's units."""
+    """Hierarchy and motion. `motion` `(T, C)`: all channels in file order, degrees and file units."""
 
     joints: tuple[Joint, ...]
     frame_time_s: float

@@ -1,7 +1,7 @@
-"""Takes: recorded bodies, and fingers where they were captured, read from any supported file into one value.
+"""Takes: recorded bodies, with captured fingers where there are any, read from every supported file.
 
-All takes are in the project frame: right-handed, Y up, metres, seconds, quaternions xyzw. The bodies `left_wrist`
-and `right_wrist` are the wrist frames of `manipnet.hand.skeleton`: the right one as it is, the left one mirrored.
+All are in the project frame: right-handed, Y up, metres, seconds, quaternions xyzw. Bodies `left_wrist` and
+`right_wrist` are the wrist frames of `manipnet.hand.skeleton`, the left one its mirror image.
 """
 
 from dataclasses import dataclass, field
