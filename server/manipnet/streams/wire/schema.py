@@ -1,0 +1,123 @@
+"""The hands message, declared once.
+
+The dataclasses below are the schema. The type of each field carries its place in the binary record, so the
+layout in `docs/protocol.md` and the constants of the readers in other languages follow from them.
+Right-handed, Y up, metres, seconds, radians, quaternions xyzw.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, Final, Literal, get_args, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+VERSION: Final = 1
+MAGIC: Final = b"MNPL"
+TOPIC_MSGPACK: Final = b"pose/msgpack "
+TOPIC_BIN: Final = b"pose/bin "
+MAX_PAYLOAD_BYTES: Final = 131_072
+NAME_BYTES: Final = 63
+"""Longest name in the binary encoding, in bytes of UTF-8; msgpack carries names of any length."""
+
+Side = Literal["left", "right"]
+State = Literal["live", "hold", "rest"]
+SIDES: Final[tuple[Side, ...]] = get_args(Side)
+STATES: Final[tuple[State, ...]] = get_args(State)
+
+NAME: Final = np.dtype([("length", "u1"), ("text", "u1", (NAME_BYTES,))])
+Array = NDArray[np.float64]
+Name = Annotated[str, NAME]
+Float = Annotated[float, np.dtype("<f4")]
+Double = Annotated[float, np.dtype("<f8")]
+Pose = Annotated[Array, np.dtype(("<f4", (7,)))]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandPose:
+    """One hand at one instant.
+
+    `angles (20,)` in the order of `skeleton.DOF_NAMES`; `rotations (17, 4)` local to the parent bone, the
+    wrist's being the identity, mirrored (S R S) for a left hand; `wrist (7,)` and `joints (26, 7)`, in
+    OpenXR order, in the world.
+    """
+
+    state: Annotated[State, np.dtype("u1")]
+    object: Annotated[str | None, NAME]
+    scale: Float
+    angles: Annotated[Array, np.dtype(("<f4", (20,)))]
+    rotations: Annotated[Array, np.dtype(("<f4", (17, 4)))]
+    wrist: Pose
+    joints: Annotated[Array, np.dtype(("<f4", (26, 7)))]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyPose:
+    """A tracked body as the server saw it at the synthesised instant: `pose (7,)` in the world."""
+
+    tracked: Annotated[bool, np.dtype("u1")]
+    pose: Pose
+    name: Name
+
+
+@dataclass(frozen=True, slots=True)
+class Latency:
+    """Where the time went, milliseconds."""
+
+    buffer: Float = 0.0
+    sense: Float = 0.0
+    infer: Float = 0.0
+    ik: Float = 0.0
+    total: Float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandsMessage:
+    """Everything the server says about one actor at one instant.
+
+    `t_capture` is the synthesised instant on the sender's clock, `t_publish` the server's monotonic clock;
+    `seq` rises by one per message of an actor.
+    """
+
+    session: Name
+    actor: Name
+    seq: Annotated[int, np.dtype("<u8")]
+    t_capture: Double
+    t_publish: Double
+    look_ahead: Double
+    hands: Mapping[Side, HandPose]
+    bodies: tuple[BodyPose, ...] = ()
+    latency_ms: Latency = Latency()
+    v: int = VERSION
+
+
+Record = list[tuple[str, np.dtype]]
+
+
+def _record(cls: type) -> Record:
+    """The fields of a dataclass that have a place in its binary record, in order."""
+    hints = get_type_hints(cls, include_extras=True)
+    named = ((f.name, getattr(hints[f.name], "__metadata__", ())) for f in fields(cls))
+    return [(name, metadata[0]) for name, metadata in named if metadata]
+
+
+RECORDS: Final = {cls: _record(cls) for cls in (HandsMessage, HandPose, BodyPose, Latency)}
+
+PREAMBLE: Final = np.dtype(
+    [
+        ("magic", "S4"),
+        ("version", "<u2"),
+        ("header_size", "<u2"),
+        ("total_size", "<u4"),
+        ("hand_size", "<u2"),
+        ("body_size", "<u2"),
+        ("hand_count", "<u2"),
+        ("body_count", "<u2"),
+    ]
+)
+"""How every binary message starts, whatever its version."""
+
+LATENCY: Final = np.dtype(RECORDS[Latency])
+HEADER: Final = np.dtype([*PREAMBLE.descr, *RECORDS[HandsMessage], ("latency_ms", LATENCY)], align=True)
+HAND: Final = np.dtype([("side", "u1"), ("has_object", "u1"), *RECORDS[HandPose]], align=True)
+BODY: Final = np.dtype(RECORDS[BodyPose], align=True)
