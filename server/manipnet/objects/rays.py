@@ -1,0 +1,75 @@
+"""First hits of many rays on a mesh: Embree where it has a wheel, our own tree elsewhere, the same answers."""
+
+from typing import Protocol
+
+import numpy as np
+from numba import njit
+
+from manipnet.geometry import Array
+from manipnet.objects.bvh import Bvh, trace_ray
+
+try:
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+except ImportError:  # no wheel for this platform (Linux ARM)
+    EmbreeScene = None
+
+
+class RayScene(Protocol):
+    """Something rays can be traced against."""
+
+    def trace(self, origins: Array, directions: Array) -> tuple[np.ndarray, np.ndarray]:
+        """First hits of rays `(N, 3)` with unit directions.
+
+        Returns the distance `(N,)` in metres, `inf` without a hit, and whether the hit surface faces away from the
+        ray's origin `(N,)`, that is, whether the ray starts inside a closed mesh.
+        """
+        ...
+
+
+class EmbreeRays:
+    """Embree called directly: about four times faster than through trimesh's wrapper."""
+
+    def __init__(self, bvh: Bvh) -> None:
+        self._scene = EmbreeScene()
+        corners = np.ascontiguousarray(bvh.corners, dtype=np.float32).reshape(-1, 3)
+        TriangleMesh(self._scene, corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
+
+    def trace(self, origins: Array, directions: Array) -> tuple[np.ndarray, np.ndarray]:
+        """See `RayScene.trace`."""
+        origins = np.ascontiguousarray(origins, dtype=np.float32)
+        directions = np.ascontiguousarray(directions, dtype=np.float32)
+        hits = self._scene.run(origins, directions, query="INTERSECT", output=True)
+        missed = hits["primID"] < 0
+        facing_away = np.einsum("ij,ij->i", hits["Ng"], directions) > 0.0
+        return np.where(missed, np.inf, hits["tfar"]), facing_away & ~missed
+
+
+class TreeRays:
+    """The same on our own tree, for platforms without Embree."""
+
+    def __init__(self, bvh: Bvh) -> None:
+        self._bvh = bvh
+
+    def trace(self, origins: Array, directions: Array) -> tuple[np.ndarray, np.ndarray]:
+        """See `RayScene.trace`."""
+        distance, facing_away = np.empty(len(origins)), np.empty(len(origins), np.bool_)
+        _trace_all(
+            self._bvh, np.asarray(origins, np.float64), np.asarray(directions, np.float64), distance, facing_away
+        )
+        return distance, facing_away
+
+
+def ray_scene(bvh: Bvh) -> RayScene:
+    """The fastest ray scene this platform has."""
+    return TreeRays(bvh) if EmbreeScene is None else EmbreeRays(bvh)
+
+
+@njit(cache=True, nogil=True)
+def _trace_all(bvh, origins, directions, distance, facing_away):
+    for i in range(len(origins)):
+        d = directions[i]
+        hit, triangle = trace_ray(bvh, origins[i, 0], origins[i, 1], origins[i, 2], d[0], d[1], d[2])
+        distance[i] = hit
+        n = bvh.normals[triangle, 0]
+        facing_away[i] = triangle >= 0 and n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0.0

@@ -1,0 +1,122 @@
+"""A shape: what the hands sense of an object. Built once from a closed mesh, cached on disk by its content."""
+
+import logging
+import os
+import zipfile
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from platformdirs import user_cache_dir
+from trimesh.triangles import mass_properties
+
+from manipnet.geometry import Array
+from manipnet.objects.bvh import Bvh, build_bvh
+from manipnet.objects.field import EXACT_WITHIN_CELLS, RESOLUTION, Field, build_field, signed_distance
+from manipnet.objects.mesh import ClosedMesh, load_mesh
+from manipnet.objects.rays import RayScene, ray_scene
+
+_CACHE_VERSION = f"1-{RESOLUTION}"
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """An object's geometry in its own frame, metres, at scale 1, with the queries the sensors and the solver make."""
+
+    mesh: ClosedMesh
+    bvh: Bvh
+    field: Field
+    center_of_mass: Array
+    """`(3,)`, for uniform density."""
+    volume_m3: float
+    inertia: Array
+    """`(3, 3)` about the centre of mass for a total mass of 1 kg."""
+
+    @property
+    def name(self) -> str:
+        """Name of the mesh it was built from."""
+        return self.mesh.name
+
+    @property
+    def content_hash(self) -> str:
+        """Hash of the geometry."""
+        return self.mesh.content_hash
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper corner, `(2, 3)`."""
+        return self.bvh.boxes[0].reshape(2, 3)
+
+    @property
+    def exact_within_m(self) -> float:
+        """Distance below which the sensors refine the field exactly."""
+        return EXACT_WITHIN_CELLS * self.field.cell_m
+
+    @cached_property
+    def rays(self) -> RayScene:
+        """Ray scene, made on first use."""
+        return ray_scene(self.bvh)
+
+    def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
+        """Exact distances of `points (N, 3)` in the object's frame: signed `(N,)`, negative inside; unit directions
+        away from the surface `(N, 3)`; closest surface points `(N, 3)`."""
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        distance, normal = np.empty(len(points)), np.empty((len(points), 3))
+        _signed_distances(self.bvh, self.field, points, np.inf, distance, normal)
+        return distance, normal, points - distance[:, None] * normal
+
+    def trace(self, origins: Array, directions: Array) -> Array:
+        """Distance `(N,)` along unit `directions (N, 3)` to the first hit, `inf` without one."""
+        return self.rays.trace(origins, directions)[0]
+
+
+@njit(cache=True, nogil=True)
+def _signed_distances(bvh, field, points, exact_within_m, distance, normal):
+    for i in range(len(points)):
+        d, x, y, z = signed_distance(bvh, field, points[i, 0], points[i, 1], points[i, 2], exact_within_m)
+        distance[i], normal[i, 0], normal[i, 1], normal[i, 2] = d, x, y, z
+
+
+def load_shape(path: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> Shape:
+    """Read a mesh file and build its shape. Raises `MeshError` as `load_mesh` does."""
+    return build_shape(load_mesh(path, unit, scale, name))
+
+
+def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
+    """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
+    folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
+    path = folder / f"{mesh.content_hash[:32]}-{_CACHE_VERSION}.npz"
+    parts = _read_cache(path)
+    if parts is None:
+        bvh = build_bvh(mesh.vertices, mesh.faces)
+        parts = bvh, build_field(bvh)
+        _write_cache(path, *parts)
+    mass = mass_properties(mesh.vertices[mesh.faces])
+    inertia = np.asarray(mass["inertia"]) / mass["mass"]
+    return Shape(mesh, *parts, np.asarray(mass["center_mass"]), float(mass["volume"]), inertia)
+
+
+def _read_cache(path: Path) -> tuple[Bvh, Field] | None:
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            bvh = Bvh(*(data[name] for name in Bvh._fields))
+            return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        _log.warning("shape cache %s is unreadable (%s); building the shape again", path, error)
+        return None
+
+
+def _write_cache(path: Path, bvh: Bvh, field: Field) -> None:
+    part = path.with_suffix(f".{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(part, "wb") as file:
+            np.savez(file, **bvh._asdict(), **field._asdict())
+        part.replace(path)
+    except OSError as error:
+        _log.warning("shape cache %s cannot be written (%s); the next start builds it again", path, error)
