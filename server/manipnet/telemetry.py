@@ -1,7 +1,17 @@
-"""What is counted while a session runs: counters with closed label sets, safe to add to from any thread."""
+"""What is counted and timed while a session runs, and the log that cannot be flooded.
 
+Every counter and the values of its label are declared here: the sets are closed, so no sender can make them
+grow.
+"""
+
+import logging
 import threading
-from collections import Counter
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+from hdrh.histogram import HdrHistogram
 
 SOURCES = ("zmq", "osc", "natnet")
 DROP_REASONS = (
@@ -13,6 +23,10 @@ DROP_REASONS = (
     "unsupported",  # a version or message kind that is not understood
     "duplicate",  # the same instant twice
     "late",  # older than what was already accepted
+    "unknown_body",  # nothing in it that the rig knows
+    "other_sender",  # a second sender of the same bodies while the first one is heard
+    "time_jump",  # far from the stream's time, and no others with it
+    "mailbox_full",  # the tick loop could not keep up
 )
 BODY_REASONS = (
     "nan",
@@ -22,13 +36,26 @@ BODY_REASONS = (
     "jump",  # farther from the last sample than a body can move: an identity swap
 )
 
+CONTROL_OPS = ("hello", "ping", "status", "objects", "select_object", "look_ahead", "rest", "invalid")
+
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "frames_in": ("source", SOURCES),
     "frames_dropped": ("reason", DROP_REASONS),
     "bodies_rejected": ("reason", BODY_REASONS),
     "sender_restarts": ("source", SOURCES),
+    "hand_ticks": ("state", ("live", "hold", "rest")),
+    "ticks_skipped": ("reason", ("backlog", "restart")),
+    "tick_errors": ("stage", ("synthesis", "publish", "dump")),
+    "output_guarded": ("reason", ("not_finite", "limit", "speed")),
+    "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "page")),
+    "control_requests": ("op", CONTROL_OPS),
+    "log_lines_suppressed": ("level", ("warning", "error")),
 }
 """Every counter with its one label and the values that label may take."""
+
+
+STAGES: Final = ("buffer", "sense", "infer", "ik", "encode", "total", "interval")
+"""What `Timings` records, seconds; `total` runs from the packet a tick waited for to its message sent."""
 
 
 class Counters:
@@ -54,3 +81,60 @@ class Counters:
         for (name, value), count in sorted(values.items()):
             result.setdefault(name, {})[value] = count
         return result
+
+
+class Timings:
+    """Durations per stage: all since the start, and the newest `window` of them for the second's line."""
+
+    def __init__(self, window: int = 960) -> None:
+        self._lock = threading.Lock()
+        self._all = {stage: HdrHistogram(1, 60_000_000, 3) for stage in STAGES}
+        self._recent = {stage: deque[float](maxlen=window) for stage in STAGES}
+
+    def record(self, stage: str, seconds: float) -> None:
+        """Add one duration; microsecond resolution, 1 µs to 60 s."""
+        with self._lock:
+            self._all[stage].record_value(min(max(int(seconds * 1e6), 1), 60_000_000))
+            self._recent[stage].append(seconds)
+
+    def recent(self, stage: str, *percentiles: float) -> list[float]:
+        """Percentiles of the newest durations in seconds, emptied by reading; zeros when there are none."""
+        with self._lock:
+            values = list(self._recent[stage])
+            self._recent[stage].clear()
+        return [float(v) for v in np.percentile(values, percentiles)] if values else [0.0] * len(percentiles)
+
+    def overall(self, stage: str, *percentiles: float) -> list[float]:
+        """Percentiles since the start, seconds."""
+        with self._lock:
+            return [self._all[stage].get_value_at_percentile(p) * 1e-6 for p in percentiles]
+
+    def count(self, stage: str) -> int:
+        """How many durations were recorded since the start."""
+        with self._lock:
+            return int(self._all[stage].get_total_count())
+
+
+class RateLimit(logging.Filter):
+    """Lets each message template through once per `interval_s`; the next one says how many it stands for."""
+
+    def __init__(self, counters: Counters, clock: Callable[[], float], interval_s: float = 5.0) -> None:
+        super().__init__()
+        self._counters, self._clock, self._interval_s = counters, clock, interval_s
+        self._last: dict[str, tuple[float, int]] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if record.levelno < logging.WARNING:
+            return True
+        # Templates are literals of our code, so this map stays small whatever arrives.
+        now, key = self._clock(), f"{record.name}:{record.msg}"
+        shown_at, held_back = self._last.get(key, (-np.inf, 0))
+        if now - shown_at < self._interval_s:
+            self._last[key] = (shown_at, held_back + 1)
+            level = "error" if record.levelno >= logging.ERROR else "warning"
+            self._counters.add("log_lines_suppressed", level=level)
+            return False
+        self._last[key] = (now, 0)
+        if held_back:
+            record.msg = f"{record.msg} (and {held_back} more like it)"
+        return True
