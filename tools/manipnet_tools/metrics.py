@@ -1,9 +1,9 @@
 """How good a roll-out is: pure functions over arrays at 60 Hz.
 
-The measures follow the paper (section 8) where it defines them; near frames, the joint error ratio, contact F1
-and the idle hand are this project's. Positions are metres, joints in the order of `hand.skeleton`; "wrist frame"
-means the canonical right hand's, so a left hand is mirrored before it comes here. A *gap* is the distance from a
-capsule's surface to the object's surface, negative inside.
+The measures follow the paper (section 8) where it defines them; near frames, the joint error ratio, contact
+F1 and the idle hand are this project's. Positions are metres, joints in the order of `hand.skeleton`; "wrist
+frame" means the canonical right hand's, so a left hand is mirrored before it comes here. A *gap* is the
+distance from a capsule's surface to the object's surface, negative inside.
 """
 
 from dataclasses import dataclass

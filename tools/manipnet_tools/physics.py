@@ -1,8 +1,8 @@
 """Can the hands' contacts explain how the object moves? The paper's appendix A, non-negative least squares.
 
-Everything is in the object's own axes, SI units, mass 1 kg: a contact may push with any non-negative mix of the
-four edges of its friction cone, and the pushes must add up to the object's acceleration minus gravity, and their
-torques about the centre of mass to its change of angular momentum.
+Everything is in the object's own axes, SI units, mass 1 kg: a contact may push with any non-negative mix of
+the four edges of its friction cone, and the pushes must add up to the object's acceleration minus gravity,
+and their torques about the centre of mass to its change of angular momentum.
 """
 
 from dataclasses import dataclass
@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 from scipy.signal import savgol_filter
+from scipy.spatial import ConvexHull
 
 from manipnet import geometry
 from manipnet.geometry import Array
+from manipnet.objects.shape import Shape
 from manipnet_tools.metrics import RATE_HZ, Gaps, Mask
 
 GRAVITY_M_S2 = 9.81
@@ -24,9 +26,9 @@ LIFTED_M = 0.02
 class Rule:
     """What counts as a contact and as explained.
 
-    Capsules with a gap below `contact_m` push; torques are divided by `lever_m` to weigh like forces; derivatives
-    come from a cubic fitted over `fit_frames` (3: plain finite differences); a remainder below `tolerance_m_s2` is
-    explained.
+    Capsules with a gap below `contact_m` push; torques are divided by `lever_m` to weigh like forces;
+    derivatives come from a cubic fitted over `fit_frames` (3: plain finite differences); a remainder below
+    `tolerance_m_s2` is explained.
     """
 
     contact_m: float
@@ -47,6 +49,12 @@ class Body:
     center_of_mass: Array
     inertia: Array
     vertices: Array
+
+
+def body_of(shape: Shape) -> Body:
+    """The shape as a solid of uniform density."""
+    vertices = shape.mesh.vertices
+    return Body(shape.center_of_mass, shape.inertia, vertices[ConvexHull(vertices).vertices])
 
 
 def lifted(T_world_object: Array, body: Body) -> Mask:
@@ -71,7 +79,8 @@ def wrench_needed(T_world_object: Array, body: Body, rule: Rule = RULE) -> Array
 
 def _derivative(values: Array, order: int, rule: Rule) -> Array:
     degree = min(3, rule.fit_frames - 1)
-    return savgol_filter(values, rule.fit_frames, degree, deriv=order, delta=1.0 / RATE_HZ, axis=0)
+    fitted = savgol_filter(values, rule.fit_frames, degree, deriv=order, delta=1.0 / RATE_HZ, axis=0)
+    return np.asarray(fitted, dtype=np.float64)
 
 
 def _continuous(q: Array) -> Array:
@@ -82,9 +91,9 @@ def _continuous(q: Array) -> Array:
 
 def cone_wrenches(point: Array, normal: Array, body: Body, rule: Rule = RULE) -> Array:
     """Wrenches of the four cone edges of contacts: points and normals `(n, 3)` to columns `(6, 4 n)`."""
-    tangent = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)])
+    tangent = np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=1)]).astype(np.float64)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    bitangent = np.cross(normal, tangent)
+    bitangent = np.cross(normal, tangent).astype(np.float64)
     sides = np.stack([tangent, -tangent, bitangent, -bitangent], axis=1)
     force = (FRICTION * sides - normal[:, None]).reshape(-1, 3)
     arm = np.repeat(point - body.center_of_mass, 4, axis=0)
