@@ -22,6 +22,7 @@ DROP_REASONS = (
     "kernel",  # lost in the socket's buffer before it was read
     "unsupported",  # a version or message kind that is not understood
     "duplicate",  # the same instant twice
+    "internal",  # a fault of our own while a frame was taken in
     "late",  # older than what was already accepted
     "unknown_body",  # nothing in it that the rig knows
     "other_sender",  # a second sender of the same bodies while the first one is heard

@@ -1,0 +1,122 @@
+"""Bodies over ZeroMQ: a bound SUB socket with its own thread; messages as in `docs/protocol-in.md`."""
+
+import ipaddress
+import socket
+import threading
+import time
+
+import zmq
+
+from manipnet.streams.bodies import MAX_MESSAGE_BYTES, MessageError, parse_bodies
+from manipnet.streams.guard import SourceGuard
+from manipnet.streams.intake import Intake, ListenError, Sink
+from manipnet.telemetry import Counters
+
+HIGH_WATER_MARK = 64
+MAX_WIRE_BYTES = 4 * MAX_MESSAGE_BYTES
+"""A message up to here is refused with a reason; a larger one costs its sender the connection."""
+HEARTBEAT_MS = 1_000
+HEARTBEAT_TIMEOUT_MS = 3_000
+
+
+class ZmqBodies:
+    """Receives body messages on `tcp://host:port`; port 0 takes a free one, see `address` after `start`."""
+
+    def __init__(self, sink: Sink, counters: Counters, host: str = "127.0.0.1", port: int = 5556) -> None:
+        self._intake = Intake("zmq", sink, counters)
+        self._guard = SourceGuard()
+        self._endpoint, self._ipv6 = zmq_endpoint(host, port)
+        self._context: zmq.Context | None = None
+        self._thread: threading.Thread | None = None
+        self.address = self._endpoint
+
+    def start(self) -> None:
+        """Bind and begin to receive; raises `ListenError` when the address cannot be bound."""
+        self._context = zmq.Context()
+        subscriber = self._context.socket(zmq.SUB)
+        harden(subscriber, self._ipv6)
+        subscriber.subscribe(b"")
+        try:
+            subscriber.bind(self._endpoint)
+        except zmq.ZMQError as error:
+            subscriber.close()
+            self._context.term()
+            raise ListenError(
+                f"cannot listen for bodies on {self._endpoint}: {zmq.strerror(error.errno or 0)}; "
+                "choose a free port (0 takes any) and an address of this machine"
+            ) from None
+        self.address = subscriber.getsockopt_string(zmq.LAST_ENDPOINT)
+        # The socket changes hands here, once, and belongs to the thread from now on.
+        self._thread = threading.Thread(target=self._run, args=(subscriber,), name="zmq-bodies", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop receiving and free the port; returns when both are done. Harmless when not started."""
+        if self._thread is None or self._context is None:
+            return
+        self._context.term()  # wakes the thread with ContextTerminated and waits until it closed its socket
+        self._thread.join()
+        self._thread = self._context = None
+
+    def _run(self, subscriber: zmq.Socket) -> None:
+        with subscriber:
+            skipping = False
+            while True:
+                try:
+                    part = subscriber.recv(copy=False)
+                except zmq.ContextTerminated:
+                    return
+                if (
+                    part.more or skipping
+                ):  # every part of a multipart message passes here, only its last counts
+                    skipping = part.more
+                    if not skipping:
+                        self._intake.drop("malformed", _source(part), "a message of several frames; send one")
+                    continue
+                self._receive(part)
+
+    def _receive(self, part: zmq.Frame) -> None:
+        now_s = time.monotonic()
+        source = _source(part)
+        if not self._guard.admits(source, now_s):
+            self._intake.drop("rate", source, "too many messages that cannot be used")
+            return
+        try:
+            frame = parse_bodies(part.bytes, now_s, source)
+        except MessageError as error:
+            self._guard.bad(source)
+            reason = "oversized" if len(part.buffer) > MAX_MESSAGE_BYTES else "malformed"
+            self._intake.drop(reason, source, error)
+            return
+        self._guard.good(source)
+        self._intake.accept(frame)
+
+
+def zmq_endpoint(host: str, port: int) -> tuple[str, bool]:
+    """`tcp://…` for a numeric address or a host name, and whether it is IPv6; raises `ListenError`."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        try:
+            address = ipaddress.ip_address(socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][4][0])
+        except (OSError, UnicodeError) as error:
+            raise ListenError(
+                f"cannot listen on host {host!r}: {error}; use an address of this machine"
+            ) from None
+    is_v6 = address.version == 6
+    return (f"tcp://[{address}]:{port}" if is_v6 else f"tcp://{address}:{port}"), is_v6
+
+
+def harden(receiver: zmq.Socket, ipv6: bool) -> None:
+    """Replace the defaults that hurt a live server: unbounded messages, no heartbeats, endless linger."""
+    receiver.setsockopt(zmq.LINGER, 0)
+    receiver.setsockopt(zmq.RCVHWM, HIGH_WATER_MARK)
+    receiver.setsockopt(zmq.MAXMSGSIZE, MAX_WIRE_BYTES)
+    receiver.setsockopt(zmq.HEARTBEAT_IVL, HEARTBEAT_MS)
+    receiver.setsockopt(zmq.HEARTBEAT_TIMEOUT, HEARTBEAT_TIMEOUT_MS)
+    receiver.setsockopt(zmq.IPV6, int(ipv6))
+
+
+def _source(part: zmq.Frame) -> str:
+    """The peer's address and its connection's descriptor, which tells two senders of one machine apart."""
+    return f"zmq:{part.get('Peer-Address')}#{part.get(zmq.SRCFD)}"
