@@ -1,0 +1,15 @@
+"""What every test may ask for."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def manipnet_data() -> Path:
+    """The ManipNet dataset, which is not part of the project."""
+    folder = os.environ.get("MANIPNET_DATA")
+    if not folder:
+        pytest.skip("MANIPNET_DATA is not set: it names the folder of the ManipNet dataset (BVH/ and meshes/)")
+    return Path(folder)
