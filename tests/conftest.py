@@ -11,5 +11,5 @@ def manipnet_data() -> Path:
     """The ManipNet dataset, which is not part of the project."""
     folder = os.environ.get("MANIPNET_DATA")
     if not folder:
-        pytest.skip("MANIPNET_DATA is not set: it names the folder of the ManipNet dataset (BVH/ and meshes/)")
+        pytest.skip("MANIPNET_DATA is not set: it names the dataset folder (BVH/ and meshes/)")
     return Path(folder)
