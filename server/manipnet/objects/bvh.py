@@ -61,7 +61,9 @@ def _order_triangles(corners):
             links[node, 0], links[node, 1] = first, last - first
             continue
         axis = int(np.argmax(center_upper - center_lower))
-        split = _partition(order, first, last, lower, upper, middle, axis, center_lower[axis], center_upper[axis])
+        split = _partition(
+            order, first, last, lower, upper, middle, axis, center_lower[axis], center_upper[axis]
+        )
         links[node, 0] = nodes
         spans[depth, 0], spans[depth, 1], spans[depth, 2] = nodes, first, split
         spans[depth + 1, 0], spans[depth + 1, 1], spans[depth + 1, 2] = nodes + 1, split, last

@@ -55,7 +55,11 @@ class TreeRays:
         """See `RayScene.trace`."""
         distance, facing_away = np.empty(len(origins)), np.empty(len(origins), np.bool_)
         _trace_all(
-            self._bvh, np.asarray(origins, np.float64), np.asarray(directions, np.float64), distance, facing_away
+            self._bvh,
+            np.asarray(origins, np.float64),
+            np.asarray(directions, np.float64),
+            distance,
+            facing_away,
         )
         return distance, facing_away
 

@@ -52,7 +52,7 @@ class Shape:
 
     @property
     def exact_within_m(self) -> float:
-        """Distance below which the sensors refine the field exactly."""
+        """Distance in the object's own metres below which the sensors refine the field exactly."""
         return EXACT_WITHIN_CELLS * self.field.cell_m
 
     @cached_property
@@ -87,7 +87,9 @@ def load_shape(path: Path | str, unit: str = "m", scale: float = 1.0, name: str 
 
 def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
-    folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
+    folder = cache_dir or Path(
+        os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False)
+    )
     path = folder / f"{mesh.content_hash[:32]}-{_CACHE_VERSION}.npz"
     parts = _read_cache(path)
     if parts is None:

@@ -1,0 +1,124 @@
+"""A model bundle: `manipnet.onnx` with its normalisation inside, `bundle.json` that says what it expects, `CARD.md`."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+
+from manipnet.geometry import Array
+from manipnet.hand.skeleton import DOF_COUNT, DOF_NAMES
+from manipnet.network.layout import INPUT_SIZE, OUTPUT_SIZE, describe
+
+FORMAT = 1
+DEFAULT_MODEL = "manipnet-small"
+
+
+class BundleError(ValueError):
+    """A bundle that cannot be used; the text names the file, what is wrong and what is expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """A trained model, ready to run."""
+
+    name: str
+    rest_angles: Array
+    """`(20,)` neutral pose, radians."""
+    limits: Array
+    """`(20, 2)` limits of the angles, radians."""
+    meta: dict[str, Any]
+    model_hash: str
+    session: onnxruntime.InferenceSession
+
+    def infer(self, rows: np.ndarray) -> np.ndarray:
+        """Network outputs `(N, 220)` of feature rows `(N, 2356)` float32, both in SI units."""
+        return self.session.run(None, {"features": rows})[0]
+
+
+def models_folder() -> Path:
+    """Where the shipped bundles are: inside an installed package, or at the top of a checkout."""
+    package = Path(__file__).resolve().parents[1]
+    installed = package / "models"
+    return installed if installed.is_dir() else package.parents[1] / "models"
+
+
+def load_bundle(
+    model: Path | str = DEFAULT_MODEL, providers: tuple[str, ...] = ("CPUExecutionProvider",)
+) -> Bundle:
+    """Load a bundle by folder or by the name of a shipped one. Raises `BundleError`."""
+    folder = Path(model)
+    if not folder.is_dir():
+        folder = models_folder() / str(model)
+    if not folder.is_dir():
+        shipped = sorted(path.name for path in models_folder().glob("*") if (path / "bundle.json").is_file())
+        raise BundleError(
+            f"model {str(model)!r} is no folder and no shipped bundle; shipped are {', '.join(shipped)}"
+        )
+    meta = _read_meta(folder / "bundle.json")
+    path = folder / "manipnet.onnx"
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be read ({error.strerror})") from None
+    model_hash = hashlib.sha256(content).hexdigest()
+    if meta.get("model_sha256") != model_hash:
+        raise BundleError(
+            f"{path}: its hash is not the one in bundle.json; the bundle is damaged, copy it again"
+        )
+    session = _open_session(path, content, providers)
+    return Bundle(folder.name, *_read_pose(folder, meta), meta, model_hash, session)
+
+
+def _open_session(path: Path, content: bytes, providers: tuple[str, ...]) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 3
+    try:
+        session = onnxruntime.InferenceSession(content, options, providers=list(providers))
+    except Exception as error:  # the runtime raises its own zoo of exceptions for a bad graph
+        raise BundleError(f"{path}: not a model this runtime can open ({error})") from None
+    sizes = [node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())]
+    if sizes != [INPUT_SIZE, OUTPUT_SIZE]:
+        raise BundleError(
+            f"{path}: takes and gives {sizes} numbers; expected are {[INPUT_SIZE, OUTPUT_SIZE]}"
+        )
+    return session
+
+
+def _read_meta(path: Path) -> dict[str, Any]:
+    try:
+        meta = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BundleError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise BundleError(f"{path}: not JSON ({error})") from None
+    if not isinstance(meta, dict) or meta.get("format") != FORMAT:
+        found = meta.get("format") if isinstance(meta, dict) else None
+        raise BundleError(
+            f"{path}: bundle format {found!r}, this version reads {FORMAT}; train or download it again"
+        )
+    if meta.get("layout") != describe():
+        raise BundleError(f"{path}: trained for another feature layout than this version's; train it again")
+    if meta.get("dofs") != list(DOF_NAMES):
+        raise BundleError(f"{path}: trained for another hand; expected angles are {', '.join(DOF_NAMES)}")
+    return meta
+
+
+def _read_pose(folder: Path, meta: dict[str, Any]) -> tuple[Array, Array]:
+    try:
+        rest = np.array(meta["rest_angles_rad"], dtype=np.float64)
+        limits = np.array(meta["limits_rad"], dtype=np.float64)
+    except (KeyError, TypeError, ValueError):
+        raise BundleError(
+            f"{folder / 'bundle.json'}: needs rest_angles_rad (20,) and limits_rad (20, 2)"
+        ) from None
+    good = rest.shape == (DOF_COUNT,) and limits.shape == (DOF_COUNT, 2)
+    if not (good and np.all(limits[:, 0] <= rest) and np.all(rest <= limits[:, 1])):
+        raise BundleError(
+            f"{folder / 'bundle.json'}: rest_angles_rad (20,) must be inside limits_rad (20, 2)"
+        )
+    return rest, limits

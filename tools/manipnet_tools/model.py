@@ -1,0 +1,135 @@
+"""ManipNet as a torch module (paper, section 6.2), with its normalisation inside, and its export to ONNX."""
+
+import io
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import nn
+
+from manipnet.network.layout import ENCODED, INPUT, INPUT_SIZE, OUTPUT, OUTPUT_SIZE
+
+Architecture = Literal["manipnet", "resnet", "mlp"]
+
+_INPUT_FLOORS = {
+    "joint_positions": 2e-3,
+    "joint_axes": 2e-2,
+    "wrist_positions": 5e-3,
+    "wrist_axes": 2e-2,
+    "other_wrist_distances": 1e-2,
+    "object_centers": 5e-3,
+    "object_angular_velocities": 0.2,
+    "ambient": 5e-2,
+    "proximity": 5e-3,
+    "signed_distances": 3e-3,
+    "surface_normals": 5e-2,
+}
+_OUTPUT_FLOORS = {"joint_positions": 2e-3, "joint_axes": 2e-2, "distances": 2e-3}
+
+
+@dataclass(frozen=True)
+class Normalisation:
+    """Mean and standard deviation of every column; deviations have a floor, or columns that hardly move would
+    amplify noise a thousandfold."""
+
+    input_mean: np.ndarray
+    input_std: np.ndarray
+    output_mean: np.ndarray
+    output_std: np.ndarray
+
+
+def normalisation(inputs: np.ndarray, outputs: np.ndarray) -> Normalisation:
+    """Statistics of samples `(N, 2356)` and `(N, 220)`."""
+    return Normalisation(
+        inputs.mean(axis=0, dtype=np.float64).astype(np.float32),
+        np.maximum(inputs.std(axis=0, dtype=np.float64), _floors(INPUT, _INPUT_FLOORS, INPUT_SIZE)).astype(
+            np.float32
+        ),
+        outputs.mean(axis=0, dtype=np.float64).astype(np.float32),
+        np.maximum(
+            outputs.std(axis=0, dtype=np.float64), _floors(OUTPUT, _OUTPUT_FLOORS, OUTPUT_SIZE)
+        ).astype(np.float32),
+    )
+
+
+def _floors(layout, floors, size) -> np.ndarray:
+    columns = np.empty(size)
+    for name, block in layout.items():
+        columns[block.columns] = floors[name]
+    return columns
+
+
+class ResidualDenseBlock(nn.Module):
+    """`a = relu(x); h = W a + b + a; c = relu(h); y = V c + d + c + a`; `dense=False` leaves out the long path."""
+
+    def __init__(self, width: int, dropout: float, dense: bool = True, residual: bool = True) -> None:
+        super().__init__()
+        self.first, self.second = nn.Linear(width, width), nn.Linear(width, width)
+        self.dropout, self.dense, self.residual = nn.Dropout(dropout), dense, residual
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """`(N, width)` to `(N, width)`."""
+        a = torch.relu(x)
+        h = self.first(self.dropout(a)) + (a if self.dense else 0.0)
+        c = torch.relu(h)
+        y = self.second(self.dropout(c)) + (c if self.dense else 0.0)
+        return y + a if self.residual else y
+
+
+class ManipNet(nn.Module):
+    """The network: three linear encoders, two residual dense blocks, a linear decoder. SI units in and out."""
+
+    def __init__(
+        self,
+        norm: Normalisation,
+        width: int = 1536,
+        dropout: float = 0.3,
+        architecture: Architecture = "manipnet",
+    ) -> None:
+        super().__init__()
+        for name in ("input_mean", "input_std", "output_mean", "output_std"):
+            self.register_buffer(name, torch.from_numpy(getattr(norm, name).copy()))
+        third = width // 3
+        self.encoders = nn.ModuleList(nn.Linear(s.stop - s.start, third) for s in ENCODED.values())
+        dense, residual = architecture == "manipnet", architecture != "mlp"
+        self.blocks = nn.Sequential(
+            *(ResidualDenseBlock(3 * third, dropout, dense, residual) for _ in range(2))
+        )
+        self.decoder = nn.Linear(3 * third, OUTPUT_SIZE)
+        self.dropout = nn.Dropout(dropout)
+        for layer in self.modules():
+            if isinstance(layer, nn.Linear):
+                nn.init.xavier_uniform_(layer.weight)
+                nn.init.zeros_(layer.bias)
+
+    def normalised(self, features: torch.Tensor) -> torch.Tensor:
+        """Outputs in standard deviations from their mean, which is what the loss sees."""
+        x = (features - self.input_mean) / self.input_std
+        parts = [
+            encode(self.dropout(x[:, columns]))
+            for encode, columns in zip(self.encoders, ENCODED.values(), strict=True)
+        ]
+        return self.decoder(self.dropout(self.blocks(torch.cat(parts, dim=1))))
+
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        """Features `(N, 2356)` to outputs `(N, 220)`."""
+        return self.normalised(features) * self.output_std + self.output_mean
+
+
+def export_onnx(model: ManipNet) -> bytes:
+    """The model as ONNX with dynamic batch, `features` in and `outputs` out, weights in single precision."""
+    model = model.eval().float()
+    buffer = io.BytesIO()
+    with torch.no_grad():
+        torch.onnx.export(
+            model,
+            (torch.zeros(2, INPUT_SIZE),),
+            buffer,
+            dynamo=False,
+            input_names=["features"],
+            output_names=["outputs"],
+            dynamic_axes={"features": {0: "hands"}, "outputs": {0: "hands"}},
+            opset_version=17,
+        )
+    return buffer.getvalue()

@@ -1,0 +1,189 @@
+"""Training: from published takes to a shipped bundle."""
+
+import hashlib
+import json
+import logging
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from manipnet.geometry import Array
+from manipnet.hand.skeleton import DOF_NAMES
+from manipnet.network.bundle import FORMAT
+from manipnet.network.layout import describe
+from manipnet.synthesis import angles_from_outputs
+from manipnet_tools.dataset import HandTrack, Samples, concatenate
+from manipnet_tools.model import Architecture, ManipNet, export_onnx, normalisation
+from manipnet_tools.perturb import captured_samples, self_made_samples
+
+_log = logging.getLogger(__name__)
+
+LIMIT_MARGIN_RAD = np.radians(7.0)
+FUTURE_FRAMES = 60
+"""Windows reach this far: samples end before a span's end, so that no test frame is seen in training."""
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """What is trained and how. Defaults are those of the shipped bundles."""
+
+    width: int = 768
+    architecture: Architecture = "manipnet"
+    dropout: float = 0.3
+    rounds: int = 12
+    """New samples are made this often."""
+    epochs_per_round: int = 3
+    batch: int = 512
+    learning_rate: float = 6e-4
+    weight_decay: float = 1e-2
+    average: float = 0.999
+    """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
+    kept: float = 0.85
+    """Share of a pose error that may remain after one tick."""
+    blended: float = 1.0
+    """Samples at blended poses, per captured frame and round."""
+    self_made: float = 0.5
+    """Samples at the model's own poses, per captured frame and round."""
+    roll_out_ticks: int = 40
+    warp: float = 0.2
+    captured: float = 0.5
+    """Samples at captured poses, per captured frame and round."""
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """A trained model with what a bundle needs besides."""
+
+    model: ManipNet
+    rest_angles: Array
+    limits: Array
+    config: TrainConfig
+    takes: tuple[str, ...]
+    seconds: float
+
+
+def spans_of(tracks: Sequence[HandTrack], share: float) -> list[tuple[int, int]]:
+    """Frames of each track that training may use: the first `share` of it, windows included."""
+    return [(FUTURE_FRAMES, int(len(track) * share) - FUTURE_FRAMES) for track in tracks]
+
+
+def train(tracks: Sequence[HandTrack], spans: Sequence[tuple[int, int]], config: TrainConfig) -> Trained:
+    """Train on the frames of `spans`, one `(first, last)` per track. Deterministic for a seed and thread count."""
+    started = time.monotonic()
+    torch.manual_seed(config.seed)
+    rng = np.random.default_rng(config.seed)
+    pool = np.concatenate(
+        [track.angles[low:high:4] for track, (low, high) in zip(tracks, spans, strict=True)]
+    )
+    limits = pose_limits(pool)
+    rest = np.clip(pool.mean(axis=0), limits[:, 0], limits[:, 1])
+    first = _make(tracks, spans, config, pool, limits, rng, None)
+    model = ManipNet(
+        normalisation(first.inputs, first.outputs), config.width, config.dropout, config.architecture
+    )
+    average = torch.optim.swa_utils.AveragedModel(
+        model, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.average)
+    )
+    optimizer = torch.optim.AdamW(
+        model.parameters(), config.learning_rate, weight_decay=config.weight_decay, fused=True
+    )
+    total = config.rounds * config.epochs_per_round
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, total, config.learning_rate / 50)
+    for turn in range(config.rounds):
+        policy = None if turn == 0 else policy_of(average.module, limits)
+        samples = first if turn == 0 else _make(tracks, spans, config, pool, limits, rng, policy)
+        for _ in range(config.epochs_per_round):
+            loss = _epoch(model, average, optimizer, samples, config.batch, rng)
+            schedule.step()
+        _log.info(
+            "round %d/%d  %d samples  loss %.4f  %.0f s",
+            turn + 1, config.rounds, len(samples), loss, time.monotonic() - started,
+        )  # fmt: skip
+    shipped = average.module if config.average else model
+    takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
+    return Trained(shipped.eval(), rest, limits, config, takes, time.monotonic() - started)
+
+
+def pose_limits(angles: Array) -> Array:
+    """Limits `(20, 2)`: the 0.5 and 99.5 percentiles of `angles (N, 20)`, widened by seven degrees."""
+    low, high = np.percentile(angles, [0.5, 99.5], axis=0)
+    return np.stack([low - LIMIT_MARGIN_RAD, high + LIMIT_MARGIN_RAD], axis=1)
+
+
+def policy_of(model: ManipNet, limits: Array):
+    """The model as a function from features to angles."""
+    model.eval()
+
+    def policy(rows: np.ndarray) -> Array:
+        with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
+            outputs = model(torch.from_numpy(rows))
+        return angles_from_outputs(outputs.double().numpy(), limits)
+
+    return policy
+
+
+def _make(tracks, spans, config: TrainConfig, pool: Array, limits: Array, rng, policy) -> Samples:
+    """One round's samples: captured, blended and, with a policy, self-made poses."""
+    parts = []
+    for track, (low, high) in zip(tracks, spans, strict=True):
+        for share, towards in ((config.captured, None), (config.blended, pool)):
+            if share:
+                frames = rng.integers(low, high, int(share * (high - low)))
+                parts.append(captured_samples(track, frames, towards, config.kept, limits, rng, config.warp))
+    if policy is not None and config.self_made:
+        wanted = config.self_made * np.mean([high - low for low, high in spans])
+        starts = max(int(wanted / config.roll_out_ticks), 1)
+        parts.append(
+            self_made_samples(
+                tracks, spans, policy, starts, config.roll_out_ticks, config.kept, pool, limits, rng
+            )
+        )
+    return concatenate(parts)
+
+
+def _epoch(model, average, optimizer, samples: Samples, batch: int, rng) -> float:
+    model.train()
+    order = rng.permutation(len(samples))
+    losses = []
+    for start in range(0, len(order) - batch + 1, batch):
+        rows = order[start : start + batch]
+        inputs, outputs = torch.from_numpy(samples.inputs[rows]), torch.from_numpy(samples.outputs[rows])
+        with torch.autocast("cpu", torch.bfloat16):
+            predicted = model.normalised(inputs).float()
+        error = predicted - (outputs - model.output_mean) / model.output_std
+        loss = (error * error).mean()
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        optimizer.step()
+        average.update_parameters(model)
+        losses.append(float(loss.detach()))
+    return float(np.mean(losses))
+
+
+def save_bundle(trained: Trained, folder: Path) -> None:
+    """Write `manipnet.onnx` and `bundle.json`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    content = export_onnx(trained.model)
+    (folder / "manipnet.onnx").write_bytes(content)
+    meta = {
+        "format": FORMAT,
+        "layout": describe(),
+        "dofs": list(DOF_NAMES),
+        "rest_angles_rad": [round(float(a), 6) for a in trained.rest_angles],
+        "limits_rad": np.round(trained.limits, 6).tolist(),
+        "model_sha256": hashlib.sha256(content).hexdigest(),
+        "training": {
+            **asdict(trained.config),
+            "takes": list(trained.takes),
+            "minutes": round(trained.seconds / 60, 1),
+            "date": date.today().isoformat(),
+        },
+        "licence": "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura",
+    }
+    (folder / "bundle.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")
