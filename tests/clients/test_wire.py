@@ -2,23 +2,19 @@
 
 import json
 import re
-import sys
 from dataclasses import replace
-from pathlib import Path
 
+import make_vectors
 import msgpack
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support import ROOT, VECTORS
 
 from manipnet.streams import wire
 from manipnet.streams.bodies import MessageError
 from manipnet.streams.wire.schema import BODY, HAND, HEADER
-
-VECTORS = Path(__file__).parent / "vectors"
-sys.path.insert(0, str(VECTORS))
-import make_vectors  # noqa: E402  (the script that wrote the files under test)
 
 MESSAGES = make_vectors.messages()
 EXPECTED = json.loads((VECTORS / "expected.json").read_text(encoding="utf-8"))
@@ -129,7 +125,7 @@ def test_a_changed_byte_never_escapes_as_another_error(offset, data):
 
 
 def test_protocol_document_states_the_true_layout():
-    text = (Path(__file__).parents[1] / "docs" / "protocol.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
     rows = {(m[1], int(m[0])) for m in re.findall(r"^\| (\d+) \| `(\w+)`", text, re.MULTILINE)}
     true = {(name, dtype.fields[name][1]) for dtype in (HEADER, HAND, BODY) for name in dtype.names}
     assert rows == true

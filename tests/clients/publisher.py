@@ -1,0 +1,63 @@
+"""Publish moving hands as `manipnet-serve` does, from the schema alone, on a port that `ready` tells."""
+
+import argparse
+import itertools
+import time
+
+import numpy as np
+import zmq
+
+from manipnet.streams.wire import (
+    TOPIC_BIN,
+    TOPIC_MSGPACK,
+    BodyPose,
+    HandPose,
+    HandsMessage,
+    encode_binary,
+    encode_msgpack,
+)
+
+RATE_HZ = 60
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def hand(x_m: float, turn_rad: float) -> HandPose:
+    """A flat hand at `(x, 0, 0)` turned about z, every joint like the wrist, every angle the turn."""
+    quat = np.array([0.0, 0.0, np.sin(turn_rad / 2), np.cos(turn_rad / 2)])
+    pose = np.array([x_m, 0.0, 0.0, *quat])
+    rotations = np.tile(IDENTITY, (17, 1))
+    return HandPose("live", "cube", 1.0, np.full(20, turn_rad), rotations, pose, np.tile(pose, (26, 1)))
+
+
+def message(seq: int, t_capture: float, x_m: float, session: str = "s") -> HandsMessage:
+    """Both hands at `x`, turned by `x` radians, and a cube."""
+    body = BodyPose(True, np.array([x_m, 0.0, 0.0, *IDENTITY]), "cube")
+    hands = {"left": hand(x_m, x_m), "right": hand(x_m, -x_m)}
+    return HandsMessage(session, "actor", seq, t_capture, time.monotonic(), 0.5, hands, (body,))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--port", type=int, default=0)
+    parser.add_argument("--session", default="s")
+    parser.add_argument("--rate", type=float, default=RATE_HZ)
+    options = parser.parse_args()
+    socket = zmq.Context.instance().socket(zmq.PUB)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.HEARTBEAT_IVL, 200)
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1000)
+    port = options.port or socket.bind_to_random_port("tcp://127.0.0.1")
+    if options.port:
+        socket.bind(f"tcp://127.0.0.1:{port}")
+    print(f"ready tcp://127.0.0.1:{port}", flush=True)
+    start = time.monotonic()
+    for seq in itertools.count():
+        due = start + seq / options.rate
+        time.sleep(max(due - time.monotonic(), 0.0))
+        out = message(seq, seq / RATE_HZ, np.sin(seq / RATE_HZ), options.session)
+        socket.send(TOPIC_BIN + encode_binary(out))
+        socket.send(TOPIC_MSGPACK + encode_msgpack(out))
+
+
+if __name__ == "__main__":
+    main()
