@@ -18,9 +18,7 @@ def frame(seq, t_capture, x, session="s"):
 def source(count, rng):
     """A hand that hurries about: smooth strokes with tremor on top, metres at 60 Hz."""
     t = np.arange(count) / RATE_HZ
-    strokes = sum(
-        a * np.sin(2 * np.pi * f * t + p) for a, f, p in ((0.2, 0.4, 0), (0.05, 1.7, 1), (0.01, 4, 2))
-    )
+    strokes = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in ((0.2, 0.4, 0), (0.05, 1.7, 1), (0.01, 4, 2)))
     return strokes + rng.normal(scale=0.0003, size=count)
 
 

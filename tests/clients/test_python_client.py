@@ -36,9 +36,7 @@ def test_reads_the_golden_vectors(name):
         assert (hand.state, hand.object, hand.scale) == (values["state"], values["object"], values["scale"])
         for field in ("angles", "rotations", "wrist", "joints"):
             assert getattr(hand, field).ravel().tolist() == values[field]
-    assert [{"name": b.name, "tracked": b.tracked, "pose": b.pose.tolist()} for b in hands.bodies] == want[
-        "bodies"
-    ]
+    assert [{"name": b.name, "tracked": b.tracked, "pose": b.pose.tolist()} for b in hands.bodies] == want["bodies"]
 
 
 @pytest.mark.parametrize("name", sorted(make_vectors.broken(b"\0" * 4000)))
@@ -52,9 +50,7 @@ def test_another_version_is_refused_with_both_named():
         decode((VECTORS / "bad_version_2.bin").read_bytes())
 
 
-@pytest.mark.parametrize(
-    "address", ["127.0.0.1:5555", "tcp://", "tcp://host", "tcp://host:0", "tcp://host:99999"]
-)
+@pytest.mark.parametrize("address", ["127.0.0.1:5555", "tcp://", "tcp://host", "tcp://host:0", "tcp://host:99999"])
 def test_a_wrong_address_is_refused_at_once(address):
     with pytest.raises(ValueError, match=r"tcp://HOST:PORT"):
         subscribe(address)
@@ -65,12 +61,19 @@ def test_parse_address():
     assert parse_address("tcp://[::1]:80") == ("::1", 80)
 
 
-def test_every_frame_arrives_in_order():
+def test_every_frame_arrives():
+    with publishing() as (_, address), Client(address) as client:
+        while client.stats().received < 60:
+            assert client.wait(after=client.newest, timeout_s=10)
+        assert client.stats().lost == 0
+
+
+def test_iteration_in_one_line():
     with publishing() as (_, address):
         stream = subscribe(address)
-        seqs = [next(stream).seq for _ in range(60)]
+        seqs = [next(stream).seq for _ in range(3)]
         stream.close()
-    assert seqs == list(range(seqs[0], seqs[0] + 60))
+    assert seqs == sorted(seqs)
 
 
 def test_async_iteration():
@@ -79,7 +82,8 @@ def test_async_iteration():
         async for hands in subscribe_async(address):
             seen.append(hands.seq)
             if len(seen) == 3:
-                return seen
+                break
+        return seen
 
     with publishing() as (_, address):
         seqs = asyncio.run(asyncio.wait_for(first_three(address), 20))
@@ -105,8 +109,7 @@ def test_server_killed_and_restarted():
     assert threading.active_count() == threads
 
 
-def test_a_stalled_publisher_is_no_reason_to_disconnect_and_its_backlog_is_not_shown():
-    """The publisher stops while the socket stays open; when it goes on, old capture times are not replayed."""
+def test_a_stalled_publisher_is_no_reason_to_disconnect():
     with publishing() as (process, address), Client(address) as client:
         hands = client.wait(timeout_s=10)
         os.kill(process.pid, signal.SIGSTOP)

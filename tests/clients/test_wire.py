@@ -88,9 +88,7 @@ def _paths(value, path=()):
 
 
 LIVE_MAP = msgpack.unpackb(wire.encode_msgpack(LIVE))
-JUNK = st.sampled_from(
-    [None, True, -1, 2**63, float("nan"), float("inf"), "x", b"\xff", [], [[1.0], 2.0], {}, {1: 2}]
-)
+JUNK = st.sampled_from([None, True, -1, 2**63, float("nan"), float("inf"), "x", b"\xff", [], [[1.0], 2.0], {}, {1: 2}])
 
 
 @given(st.sampled_from([p for p in _paths(LIVE_MAP) if p]), JUNK)
