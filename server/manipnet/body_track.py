@@ -1,0 +1,120 @@
+"""The recent poses of one streamed body, and their interpolation by time."""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from manipnet.geometry import Array, quat_slerp
+
+KEEP: Final = 1024
+"""Newest samples kept: more than 2 s at the highest rate accepted."""
+MIN_SPACING_S: Final = 0.0015
+"""Samples closer than this to their neighbour are not taken: no tracker is that fast."""
+TIME_TOLERANCE_S: Final = 1e-6
+"""Two clocks readings this near are the same instant: times are sums of rounded fractions."""
+
+Forecast = Callable[[Array, Array, Array], Array]
+"""`(history times (m,), history poses (m, 7), times (n,)) -> poses (n, 7)`; the history ends before the
+times.
+"""
+
+
+class BodyTrack:
+    """Time-ordered poses of one body on its sender's clock; samples may arrive late or in the wrong order."""
+
+    def __init__(self) -> None:
+        self._times = np.empty(2 * KEEP)
+        self._poses = np.empty((2 * KEEP, 7))
+        self._count = 0
+        self.seen_s = -np.inf
+        """Newest instant this body was heard of, tracked or not."""
+
+    @property
+    def times(self) -> Array:
+        """Sample times, rising, `(n,)` seconds."""
+        return self._times[: self._count]
+
+    @property
+    def poses(self) -> Array:
+        """World poses at `times`, `(n, 7)`, neighbouring quaternions in the same hemisphere."""
+        return self._poses[: self._count]
+
+    def add(self, t_s: float, pose: Array | Sequence[float]) -> bool:
+        """Put one tracked pose in its place; False when there is one at (nearly) that instant already."""
+        at = (
+            int(np.searchsorted(self.times, t_s))
+            if self._count and t_s <= self._times[self._count - 1]
+            else self._count
+        )
+        for neighbour in (at - 1, at):
+            if 0 <= neighbour < self._count and abs(self._times[neighbour] - t_s) < MIN_SPACING_S:
+                return False
+        if self._count == len(self._times):
+            self._forget()
+            at -= KEEP
+            if at < 0:
+                return False
+        self._times[at + 1 : self._count + 1] = self._times[at : self._count]
+        self._poses[at + 1 : self._count + 1] = self._poses[at : self._count]
+        self._times[at], self._poses[at] = t_s, pose
+        self._count += 1
+        self._align(at)
+        return True
+
+    def interval_s(self) -> float:
+        """Median spacing of the newest samples; infinite before the second one."""
+        newest = self.times[-16:]
+        return float(np.median(np.diff(newest))) if len(newest) > 1 else np.inf
+
+    def age_s(self, t_s: float) -> float:
+        """Time since the newest tracked sample at or before `t_s`; infinite when there is none."""
+        before = int(np.searchsorted(self.times, t_s + TIME_TOLERANCE_S))
+        return max(t_s - float(self._times[before - 1]), 0.0) if before else np.inf
+
+    def known(self, until_s: float) -> int:
+        """How many samples serve an instant `until_s`: up to the first one at or after it, which brackets it."""
+        return min(int(np.searchsorted(self.times, until_s - TIME_TOLERANCE_S)) + 1, self._count)
+
+    def _align(self, at: int) -> None:
+        """Keep every neighbouring pair of quaternions in one hemisphere (trackers flip signs freely)."""
+        if at and self._poses[at, 3:] @ self._poses[at - 1, 3:] < 0.0:
+            self._poses[at, 3:] *= -1.0
+        for i in range(at + 1, self._count):
+            if self._poses[i, 3:] @ self._poses[i - 1, 3:] >= 0.0:
+                break
+            self._poses[i, 3:] *= -1.0
+
+    def _forget(self) -> None:
+        self._times[:KEEP] = self._times[KEEP:].copy()
+        self._poses[:KEEP] = self._poses[KEEP:].copy()
+        self._count = KEEP
+
+
+def sample(tracks: Sequence[BodyTrack], times_s: Array, until_s: float, forecast: Forecast | None) -> Array:
+    """Poses of several non-empty tracks at `times_s (n,)`: `(len(tracks), n, 7)`.
+
+    Positions are interpolated linearly, rotations on the shortest arc, both by time. Only samples up to
+    `until_s` and the one that brackets it are used. Before the first sample its pose stands; after the last one `forecast` continues the
+    motion, or the last pose stands when there is none.
+    """
+    known = [track.known(until_s) for track in tracks]
+    before, after, fraction = [], [], []
+    for track, count in zip(tracks, known, strict=True):
+        upper = np.clip(np.searchsorted(track.times[:count], times_s, side="right"), 1, max(count - 1, 1))
+        upper = np.minimum(upper, count - 1)
+        lower = np.maximum(upper - 1, 0)
+        span = np.maximum(track.times[upper] - track.times[lower], MIN_SPACING_S)
+        before.append(track.poses[lower])
+        after.append(track.poses[upper])
+        fraction.append(np.clip((times_s - track.times[lower]) / span, 0.0, 1.0))
+    a, b, f = np.stack(before), np.stack(after), np.stack(fraction)
+    poses = np.concatenate(
+        [a[..., :3] + f[..., None] * (b - a)[..., :3], quat_slerp(a[..., 3:], b[..., 3:], f)], axis=-1
+    )
+    if forecast is not None:
+        for row, track, count in zip(poses, tracks, known, strict=True):
+            beyond = times_s > track.times[count - 1] + TIME_TOLERANCE_S
+            if beyond.any():
+                row[beyond] = forecast(track.times[:count], track.poses[:count], times_s[beyond])
+    return poses

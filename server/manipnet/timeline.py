@@ -1,0 +1,279 @@
+"""Stream time: frames at any rate in, ticks at exactly 60 per second of the sender's time out.
+
+The tick `k` of a run shows the instant `t0 + k/60`, where `t0` is the run's first frame. Its pose is computed
+from the window centred one tick earlier (the paper's X_{t-1} -> Y_t), so it falls due once samples up to that
+centre plus the look-ahead have arrived. In a silence our own clock carries stream time on, so ticks never
+stop. The clock is always an argument; nothing here waits, sends or reads the time.
+"""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Final
+
+import numpy as np
+
+from manipnet.body_track import TIME_TOLERANCE_S, BodyTrack, Forecast, sample
+from manipnet.forecast import damped_velocity
+from manipnet.geometry import Array
+
+TICK_HZ: Final = 60
+TICK_S: Final = 1.0 / TICK_HZ
+WINDOW_OFFSETS_S: Final = np.linspace(-0.5, 0.5, 21)
+"""Instants of a window relative to its centre."""
+MAX_LOOK_AHEAD_S: Final = 0.5
+
+SILENCE_S: Final = 0.06
+"""Without a frame for this long (or three usual intervals, if longer) our clock carries stream time on."""
+MAX_BACKLOG: Final = 30
+"""Ticks due at once beyond which all but the newest are skipped."""
+SLEW: Final = 0.25
+"""A changed look-ahead is reached by making ticks this much faster or slower, so none is missing."""
+VANISHED_S: Final = 0.1
+"""Ticks never wait longer than this for one body while others are being sent."""
+RESTART_S: Final = 0.5
+"""A frame this far behind the stream, or `AHEAD_S` ahead of it, may be a sender that started again."""
+AHEAD_S: Final = 0.5
+WITNESSES: Final = 3
+"""Frames in a row that must agree on a new time before it is believed: one bad stamp must not move the
+clock.
+"""
+OTHER_SENDER_S: Final = 0.5
+"""A second sender is listened to once the first one was silent this long."""
+
+Pose = Array | Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
+class BodyAtTick:
+    """One body as one tick sees it: `window (21, 7)` around the centre, `pose (7,)` at the tick, world frame.
+
+    `age_s` is the time from its newest tracked sample to the tick.
+    """
+
+    window: Array
+    pose: Array
+    age_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """One instant to show. `bodies` holds those tracked at least once in this run; `run` counts sender
+    restarts.
+    """
+
+    run: int
+    index: int
+    time_s: float
+    centre_s: float
+    look_ahead_s: float
+    waited_for_s: float
+    """Our clock when what the tick needed had arrived, or when our clock let it fall due."""
+    silent: bool
+    bodies: Mapping[str, BodyAtTick]
+
+
+class Run:
+    """The frames of one run of a sender's clock, and the ticks counted from its first frame."""
+
+    def __init__(self, number: int, t0_s: float, now_s: float) -> None:
+        self.number, self.t0_s = number, t0_s
+        self.tracks: dict[str, BodyTrack] = {}
+        self.next_index = 0
+        self.newest_s, self.heard_s = t0_s, now_s
+        self.carried_s: float | None = None
+        """When our clock, not a frame, let the newest tick go."""
+        self._gaps_s = deque[float](maxlen=32)
+
+    def add(self, t_s: float, poses: Mapping[str, Pose | None], now_s: float) -> int:
+        """Take a frame; a pose of None is a body that is not tracked. Returns how many poses were
+        duplicates.
+        """
+        if t_s > self.newest_s:
+            self._gaps_s.append(now_s - self.heard_s)
+            self.newest_s, self.heard_s = t_s, now_s
+        doubled = 0
+        for key, pose in poses.items():
+            track = self.tracks.setdefault(key, BodyTrack())
+            track.seen_s = max(track.seen_s, t_s)
+            doubled += pose is not None and not track.add(t_s, pose)
+        return doubled
+
+    def silence_s(self) -> float:
+        """How long without a frame counts as silence."""
+        return max(SILENCE_S, 3.0 * median(self._gaps_s)) if self._gaps_s else SILENCE_S
+
+    def arrived_s(self) -> float:
+        """Stream time up to which every body that is still being sent has arrived."""
+        reached = self.newest_s
+        for track in self.tracks.values():
+            lag = self.newest_s - track.seen_s
+            if 0.0 < lag <= min(2.5 * track.interval_s(), VANISHED_S):
+                reached = min(reached, track.seen_s)
+        return reached
+
+    def clock_s(self, now_s: float) -> float:
+        """Stream time if the sender's clock went on since its newest frame."""
+        return self.newest_s + (now_s - self.heard_s)
+
+    def tick_s(self, index: int) -> float:
+        """The instant of a tick."""
+        return self.t0_s + index / TICK_HZ
+
+
+class Timeline:
+    """From the frames of one actor to its ticks, through lost, late and restarted senders."""
+
+    def __init__(self, look_ahead_s: float = MAX_LOOK_AHEAD_S, forecast: Forecast = damped_velocity) -> None:
+        self.look_ahead_s = look_ahead_s
+        """What is asked for; may be set at any time within 0 … `MAX_LOOK_AHEAD_S`."""
+        self.skipped = 0
+        self.restarts = 0
+        self._forecast = forecast
+        self._effective_s = look_ahead_s
+        self._run: Run | None = None
+        self._ending: Run | None = None
+        self._source = ""
+        self._witnesses: list[tuple[float, Mapping[str, Pose | None], float]] = []
+
+    def push(self, t_s: float, poses: Mapping[str, Pose | None], now_s: float, source: str = "") -> str | None:
+        """Take one frame of this actor's bodies; returns why it was dropped, or None.
+
+        Reasons are `telemetry.DROP_REASONS`: other_sender, time_jump, late, duplicate.
+        """
+        run = self._run
+        if run is None:
+            self._source = source
+            self._begin(t_s, now_s).add(t_s, poses, now_s)
+            return None
+        silent_for = now_s - run.heard_s
+        if source != self._source and silent_for < OTHER_SENDER_S:
+            return "other_sender"
+        if not -RESTART_S < t_s - run.newest_s < AHEAD_S + 1.5 * silent_for:
+            return self._doubt(t_s, poses, now_s, source)
+        self._source = source
+        self._witnesses.clear()
+        if silent_for > run.silence_s() and self._due_s(run, run.next_index) - t_s > RESTART_S:
+            # Our clock carried the ticks on, but the sender had stood still: its time goes on behind them.
+            run = self._begin(t_s, now_s)
+        doubled = run.add(t_s, poses, now_s)
+        return "duplicate" if doubled and doubled == len(poses) else None
+
+    def poll(self, now_s: float) -> Tick | None:
+        """The next tick that is due, if any. Call again until None: one frame may make several due."""
+        run = self._run
+        if run is None:
+            return None
+        if self._ending is not None:
+            if self._due_s(run, run.next_index) > self._reached_s(run, now_s):
+                return self._take(self._ending, self._ending.clock_s(now_s), now_s)
+            self.skipped += max(
+                int((self._ending.newest_s - self._ending.tick_s(self._ending.next_index)) * TICK_HZ), 0
+            )
+            self._ending = None
+        return self._take(run, self._reached_s(run, now_s), now_s)
+
+    def next_poll_s(self, now_s: float) -> float:
+        """When, on our clock, the next tick falls due if no frame comes before; infinite before the first
+        frame.
+        """
+        if self._run is None:
+            return np.inf
+        run = self._ending or self._run
+        quiet_until = run.heard_s + (0.0 if self._ending else run.silence_s())
+        by_clock = max(quiet_until, run.heard_s + self._due_s(run, run.next_index) - run.newest_s)
+        return max(min(by_clock, self._patience_s(run)), now_s)
+
+    def health(self, now_s: float) -> dict[str, dict[str, float]]:
+        """Per body: `rate_hz` of its samples, and `age_s` since the newest tracked one by the stream's
+        clock.
+        """
+        if self._run is None:
+            return {}
+        clock = self._run.clock_s(now_s)
+        return {
+            key: {"rate_hz": 1.0 / track.interval_s(), "age_s": track.age_s(clock)}
+            for key, track in self._run.tracks.items()
+        }
+
+    def _due_s(self, run: Run, index: int) -> float:
+        """Stream time that must have arrived for a tick; the instant it shows is always part of it."""
+        return run.tick_s(index) + max(self._effective_s - TICK_S, 0.0)
+
+    def _reached_s(self, run: Run, now_s: float) -> float:
+        now_s += TIME_TOLERANCE_S  # a poll at just the time asked for must not come too early by a rounding
+        if now_s - run.heard_s >= run.silence_s():
+            return run.clock_s(now_s)
+        if now_s >= self._patience_s(run):
+            return max(run.arrived_s(), self._due_s(run, run.next_index))
+        return run.arrived_s()
+
+    def _patience_s(self, run: Run) -> float:
+        """When a tick goes without its frames because our clock had run ahead of a sender that came back.
+
+        Ticks then come a little slower, until the sender has caught up, instead of stopping.
+        """
+        return np.inf if run.carried_s is None else run.carried_s + TICK_S * (1.0 + SLEW)
+
+    def _take(self, run: Run, reached_s: float, now_s: float) -> Tick | None:
+        limit = reached_s + TIME_TOLERANCE_S
+        if self._due_s(run, run.next_index) > limit:
+            return None
+        backlog = int((limit - self._due_s(run, run.next_index)) * TICK_HZ)
+        if backlog >= MAX_BACKLOG:
+            self.skipped += backlog
+            run.next_index += backlog
+        run.carried_s = now_s if self._due_s(run, run.next_index) > run.newest_s + TIME_TOLERANCE_S else None
+        tick = self._tick(run, run.next_index, now_s)
+        run.next_index += 1
+        self._slew()
+        return tick
+
+    def _tick(self, run: Run, index: int, now_s: float) -> Tick:
+        time_s, due_s = run.tick_s(index), self._due_s(run, index)
+        centre_s = time_s - TICK_S
+        silent = due_s > run.newest_s + TIME_TOLERANCE_S
+        tracks = {key: track for key, track in run.tracks.items() if len(track.times)}
+        bodies: dict[str, BodyAtTick] = {}
+        if tracks:
+            instants = np.append(centre_s + WINDOW_OFFSETS_S, time_s)
+            # The future of a sender that has stopped is not forecast: its last pose stands.
+            poses = sample(list(tracks.values()), instants, due_s, None if silent else self._forecast)
+            bodies = {
+                key: BodyAtTick(rows[:-1], rows[-1], track.age_s(time_s))
+                for (key, track), rows in zip(tracks.items(), poses, strict=True)
+            }
+        waited_for_s = max(run.heard_s, run.heard_s + due_s - run.newest_s)
+        return Tick(run.number, index, time_s, centre_s, self._effective_s, min(waited_for_s, now_s), silent, bodies)
+
+    def _slew(self) -> None:
+        step = SLEW * TICK_S
+        self._effective_s += min(max(self.look_ahead_s - self._effective_s, -step), step)
+
+    def _begin(self, t_s: float, now_s: float) -> Run:
+        """Start a run; the one before plays out by our clock until the new one's first tick is due."""
+        number = 0
+        if self._run is not None:
+            self.restarts += 1
+            number = self._run.number + 1
+            self._ending = self._ending or self._run
+        else:
+            self._effective_s = self.look_ahead_s
+        self._witnesses.clear()
+        self._run = Run(number, t_s, now_s)
+        return self._run
+
+    def _doubt(self, t_s: float, poses: Mapping[str, Pose | None], now_s: float, source: str) -> str | None:
+        """Hold back a frame of an unlikely time until enough others agree with it."""
+        if self._witnesses and not 0.0 < t_s - self._witnesses[-1][0] < AHEAD_S:
+            self._witnesses.clear()
+        self._witnesses.append((t_s, poses, now_s))
+        if len(self._witnesses) < WITNESSES:
+            return "time_jump"
+        witnesses = list(self._witnesses)
+        self._source = source
+        run = self._begin(witnesses[0][0], witnesses[0][2])
+        for witness in witnesses:
+            run.add(*witness)
+        return None
