@@ -26,6 +26,7 @@ _INPUT_FLOORS = {
     "surface_normals": 5e-2,
 }
 _OUTPUT_FLOORS = {"joint_positions": 2e-3, "joint_axes": 2e-2, "distances": 2e-3}
+_CHANGE_FLOORS = {"joint_positions": 2e-4, "joint_axes": 2e-3, "distances": 2e-3}
 
 
 @dataclass(frozen=True)
@@ -37,20 +38,26 @@ class Normalisation:
     input_std: np.ndarray
     output_mean: np.ndarray
     output_std: np.ndarray
+    carries_pose: bool
+    """Whether the output statistics are of the change since the pose that went in."""
 
 
-def normalisation(inputs: np.ndarray, outputs: np.ndarray) -> Normalisation:
+def normalisation(inputs: np.ndarray, outputs: np.ndarray, carries_pose: bool) -> Normalisation:
     """Statistics of samples `(N, 2356)` and `(N, 220)`."""
+    if carries_pose:
+        outputs = outputs.copy()
+        outputs[:, _POSE] -= inputs[:, _POSE]
+    floors = _CHANGE_FLOORS if carries_pose else _OUTPUT_FLOORS
     return Normalisation(
-        inputs.mean(axis=0, dtype=np.float64).astype(np.float32),
-        np.maximum(inputs.std(axis=0, dtype=np.float64), _floors(INPUT, _INPUT_FLOORS, INPUT_SIZE)).astype(
-            np.float32
-        ),
-        outputs.mean(axis=0, dtype=np.float64).astype(np.float32),
-        np.maximum(
-            outputs.std(axis=0, dtype=np.float64), _floors(OUTPUT, _OUTPUT_FLOORS, OUTPUT_SIZE)
-        ).astype(np.float32),
+        *_statistics(inputs, _floors(INPUT, _INPUT_FLOORS, INPUT_SIZE)),
+        *_statistics(outputs, _floors(OUTPUT, floors, OUTPUT_SIZE)),
+        carries_pose,
     )
+
+
+def _statistics(values: np.ndarray, floors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    std = np.maximum(values.std(axis=0, dtype=np.float64), floors)
+    return values.mean(axis=0, dtype=np.float64).astype(np.float32), std.astype(np.float32)
 
 
 def _floors(layout, floors, size) -> np.ndarray:
@@ -58,6 +65,9 @@ def _floors(layout, floors, size) -> np.ndarray:
     for name, block in layout.items():
         columns[block.columns] = floors[name]
     return columns
+
+
+_POSE = ENCODED["pose"]
 
 
 class ResidualDenseBlock(nn.Module):
@@ -90,6 +100,7 @@ class ManipNet(nn.Module):
         super().__init__()
         for name in ("input_mean", "input_std", "output_mean", "output_std"):
             self.register_buffer(name, torch.from_numpy(getattr(norm, name).copy()))
+        self.carries_pose = norm.carries_pose
         third = width // 3
         self.encoders = nn.ModuleList(nn.Linear(s.stop - s.start, third) for s in ENCODED.values())
         dense, residual = architecture == "manipnet", architecture != "mlp"
@@ -112,9 +123,17 @@ class ManipNet(nn.Module):
         ]
         return self.decoder(self.dropout(self.blocks(torch.cat(parts, dim=1))))
 
+    def normalise_outputs(self, features: torch.Tensor, outputs: torch.Tensor) -> torch.Tensor:
+        """What `normalised` should have answered."""
+        return (outputs - self._carried(features) - self.output_mean) / self.output_std
+
     def forward(self, features: torch.Tensor) -> torch.Tensor:
         """Features `(N, 2356)` to outputs `(N, 220)`."""
-        return self.normalised(features) * self.output_std + self.output_mean
+        return self.normalised(features) * self.output_std + self.output_mean + self._carried(features)
+
+    def _carried(self, features: torch.Tensor) -> torch.Tensor:
+        pose = features[:, _POSE] if self.carries_pose else torch.zeros_like(features[:, _POSE])
+        return torch.nn.functional.pad(pose, (0, OUTPUT_SIZE - (_POSE.stop - _POSE.start)))
 
 
 def export_onnx(model: ManipNet) -> bytes:

@@ -34,14 +34,16 @@ class TrainConfig:
 
     width: int = 768
     architecture: Architecture = "manipnet"
+    carries_pose: bool = True
+    """Predict the change of the pose, in units of its own deviation, instead of the pose."""
     dropout: float = 0.3
     rounds: int = 12
     """New samples are made this often."""
     epochs_per_round: int = 3
-    batch: int = 512
+    batch: int = 128
     learning_rate: float = 6e-4
     weight_decay: float = 1e-2
-    average: float = 0.999
+    average: float = 0.998
     """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
     kept: float = 0.85
     """Share of a pose error that may remain after one tick."""
@@ -85,7 +87,7 @@ def train(tracks: Sequence[HandTrack], spans: Sequence[tuple[int, int]], config:
     rest = np.clip(pool.mean(axis=0), limits[:, 0], limits[:, 1])
     first = _make(tracks, spans, config, pool, limits, rng, None)
     model = ManipNet(
-        normalisation(first.inputs, first.outputs), config.width, config.dropout, config.architecture
+        normalisation(first.inputs, first.outputs, config.carries_pose), config.width, config.dropout, config.architecture
     )
     average = torch.optim.swa_utils.AveragedModel(
         model, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.average)
@@ -156,7 +158,8 @@ def _epoch(model, average, optimizer, samples: Samples, batch: int, rng) -> floa
         inputs, outputs = torch.from_numpy(samples.inputs[rows]), torch.from_numpy(samples.outputs[rows])
         with torch.autocast("cpu", torch.bfloat16):
             predicted = model.normalised(inputs).float()
-        error = predicted - (outputs - model.output_mean) / model.output_std
+        target = model.normalise_outputs(inputs, outputs)
+        error = predicted - target
         loss = (error * error).mean()
         optimizer.zero_grad(set_to_none=True)
         loss.backward()

@@ -103,7 +103,7 @@ def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
 
 def _read_cache(path: Path) -> tuple[Bvh, Field] | None:
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
             bvh = Bvh(*(data[name] for name in Bvh._fields))
             return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
     except FileNotFoundError:
