@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipnet.geometry import Array, quat_exp, quat_log, quat_multiply, quat_normalize
-from manipnet.timeline import MAX_BACKLOG, SILENCE_S, TICK_S, WINDOW_OFFSETS_S, Tick, Timeline
+from manipnet.network.layout import WINDOW_OFFSETS_S
+from manipnet.timeline import MAX_BACKLOG, SILENCE_S, TICK_S, Tick, Timeline
 
 VELOCITY = np.array([0.3, -0.2, 0.1])
 SPIN = np.array([0.5, 1.5, -0.7])
@@ -239,6 +240,19 @@ def test_a_second_sender_is_kept_out_until_the_first_falls_silent() -> None:
         assert timeline.push(900 + i / 120, {"body": screw(i / 120)}, now, "osc:b") == "other_sender"
     reasons = [timeline.push(910 + i / 120, {"body": screw(i / 120)}, 12.0 + i / 120, "osc:b") for i in range(5)]
     assert reasons == ["time_jump", "time_jump", None, None, None]
+
+
+def test_two_senders_may_share_an_actor_if_they_share_a_clock_and_no_body() -> None:
+    timeline = Timeline(0.0)
+    for i in range(120):
+        t, now = i / 120, 10.0 + i / 120
+        assert timeline.push(t, {"wrist": screw(t)}, now, "osc:a") is None
+        assert timeline.push(t, {"prop": screw(t)}, now, "osc:b") is None
+        assert timeline.push(t, {"wrist": screw(0.0)}, now, "osc:c") == "other_sender"
+        assert timeline.push(t + 50, {"cup": screw(t)}, now, "osc:d") == "other_sender"
+    tick = drain(timeline, 11.0)[0]
+    assert set(tick.bodies) == {"wrist", "prop"}
+    assert same_pose(tick.bodies["wrist"].pose, screw(tick.time_s))
 
 
 def test_two_senders_with_one_name_do_not_fight_over_the_clock() -> None:

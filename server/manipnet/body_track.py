@@ -94,9 +94,9 @@ class BodyTrack:
 def sample(tracks: Sequence[BodyTrack], times_s: Array, until_s: float, forecast: Forecast | None) -> Array:
     """Poses of several non-empty tracks at `times_s (n,)`: `(len(tracks), n, 7)`.
 
-    Positions are interpolated linearly, rotations on the shortest arc, both by time. Only samples up to
-    `until_s` and the one that brackets it are used. Before the first sample its pose stands; after the last one `forecast` continues the
-    motion, or the last pose stands when there is none.
+    Positions are interpolated linearly, rotations on the shortest arc, both by time. Only samples up to `until_s`
+    and the one that brackets it are used. Before the first sample its pose stands; after the last one `forecast`
+    continues the motion, or the last pose stands when there is none.
     """
     known = [track.known(until_s) for track in tracks]
     before, after, fraction = [], [], []

@@ -17,11 +17,10 @@ import numpy as np
 from manipnet.body_track import TIME_TOLERANCE_S, BodyTrack, Forecast, sample
 from manipnet.forecast import damped_velocity
 from manipnet.geometry import Array
+from manipnet.network.layout import WINDOW_OFFSETS_S
 
 TICK_HZ: Final = 60
 TICK_S: Final = 1.0 / TICK_HZ
-WINDOW_OFFSETS_S: Final = np.linspace(-0.5, 0.5, 21)
-"""Instants of a window relative to its centre."""
 MAX_LOOK_AHEAD_S: Final = 0.5
 
 SILENCE_S: Final = 0.06
@@ -39,10 +38,16 @@ WITNESSES: Final = 3
 """Frames in a row that must agree on a new time before it is believed: one bad stamp must not move the
 clock.
 """
-OTHER_SENDER_S: Final = 0.5
-"""A second sender is listened to once the first one was silent this long."""
+OTHER_SENDER_S: Final = 0.2
+"""A body, and the clock, may pass to another sender once the one that had it was silent this long."""
 
 Pose = Array | Sequence[float]
+Poses = Mapping[str, Pose | None]
+"""One frame's bodies of interest; None is one that is not tracked."""
+
+
+_CLOCK: Final = ""
+"""Key of the sender whose time is the stream's, among those of the bodies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +91,7 @@ class Run:
         """When our clock, not a frame, let the newest tick go."""
         self._gaps_s = deque[float](maxlen=32)
 
-    def add(self, t_s: float, poses: Mapping[str, Pose | None], now_s: float) -> int:
+    def add(self, t_s: float, poses: Poses, now_s: float) -> int:
         """Take a frame; a pose of None is a body that is not tracked. Returns how many poses were
         duplicates.
         """
@@ -134,25 +139,25 @@ class Timeline:
         self._effective_s = look_ahead_s
         self._run: Run | None = None
         self._ending: Run | None = None
-        self._source = ""
-        self._witnesses: list[tuple[float, Mapping[str, Pose | None], float]] = []
+        self._senders: dict[str, tuple[str, float]] = {}
+        self._witnesses: list[tuple[float, Poses, float]] = []
 
-    def push(self, t_s: float, poses: Mapping[str, Pose | None], now_s: float, source: str = "") -> str | None:
+    def push(self, t_s: float, poses: Poses, now_s: float, source: str = "") -> str | None:
         """Take one frame of this actor's bodies; returns why it was dropped, or None.
 
-        Reasons are `telemetry.DROP_REASONS`: other_sender, time_jump, late, duplicate.
+        Reasons are of `telemetry.DROP_REASONS`: other_sender, time_jump, duplicate. Several senders may share an
+        actor if they share a clock and no body.
         """
-        run = self._run
-        if run is None:
-            self._source = source
-            self._begin(t_s, now_s).add(t_s, poses, now_s)
-            return None
-        silent_for = now_s - run.heard_s
-        if source != self._source and silent_for < OTHER_SENDER_S:
+        poses = {key: pose for key, pose in poses.items() if self._may_send(key, source, now_s)}
+        if not poses:
             return "other_sender"
+        run = self._run or self._begin(t_s, now_s)
+        silent_for = now_s - run.heard_s
         if not -RESTART_S < t_s - run.newest_s < AHEAD_S + 1.5 * silent_for:
             return self._doubt(t_s, poses, now_s, source)
-        self._source = source
+        for key in (_CLOCK, *poses):
+            if self._may_send(key, source, now_s):
+                self._senders[key] = (source, now_s)
         self._witnesses.clear()
         if silent_for > run.silence_s() and self._due_s(run, run.next_index) - t_s > RESTART_S:
             # Our clock carried the ticks on, but the sender had stood still: its time goes on behind them.
@@ -264,15 +269,22 @@ class Timeline:
         self._run = Run(number, t_s, now_s)
         return self._run
 
-    def _doubt(self, t_s: float, poses: Mapping[str, Pose | None], now_s: float, source: str) -> str | None:
+    def _may_send(self, key: str, source: str, now_s: float) -> bool:
+        """Whether `source` has, or may take over, a body or the clock."""
+        owner, heard_s = self._senders.get(key, (source, now_s))
+        return owner == source or now_s - heard_s >= OTHER_SENDER_S
+
+    def _doubt(self, t_s: float, poses: Poses, now_s: float, source: str) -> str | None:
         """Hold back a frame of an unlikely time until enough others agree with it."""
+        if not self._may_send(_CLOCK, source, now_s):
+            return "other_sender"
         if self._witnesses and not 0.0 < t_s - self._witnesses[-1][0] < AHEAD_S:
             self._witnesses.clear()
         self._witnesses.append((t_s, poses, now_s))
         if len(self._witnesses) < WITNESSES:
             return "time_jump"
         witnesses = list(self._witnesses)
-        self._source = source
+        self._senders = dict.fromkeys((_CLOCK, *poses), (source, now_s))
         run = self._begin(witnesses[0][0], witnesses[0][2])
         for witness in witnesses:
             run.add(*witness)
