@@ -1,0 +1,114 @@
+"""What is shown of a hand while its tracking comes and goes: live, hold, rest, and never a jump between them."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from manipnet.geometry import Array, quat_conjugate, quat_exp, quat_log, quat_multiply
+
+State = Literal["live", "hold", "rest"]
+WORST_FIRST: Final[tuple[State, ...]] = ("rest", "hold", "live")
+
+HOLD_AFTER_S: Final = 0.1
+REST_AFTER_S: Final = 0.5
+"""Without a tracked sample for this long, a body's hand is held, and then eases to the rest pose."""
+
+RETURN_HALF_LIFE_S: Final = 0.06
+"""Back to live: nine tenths of the way in 0.2 s."""
+REST_HALF_LIFE_S: Final = 0.2
+
+_TOLERANCE_S: Final = 1e-6
+
+
+def state_at_age(age_s: float) -> State:
+    """State of a hand whose tracking is `age_s` old; an age of infinity is a body never seen."""
+    if age_s <= HOLD_AFTER_S + _TOLERANCE_S:
+        return "live"
+    return "hold" if age_s <= REST_AFTER_S + _TOLERANCE_S else "rest"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """What one hand shows at one tick: `angles (20,)`, `wrist (7,)` in the world."""
+
+    state: State
+    angles: Array
+    wrist: Array
+
+
+class Ease:
+    """The gap between what is shown and what should be: opened by a change of source, closed by a critically
+    damped spring, so what is shown neither jumps nor overshoots."""
+
+    def __init__(self, size: int) -> None:
+        self.gap = np.zeros(size)
+        self._speed = np.zeros(size)
+
+    def open(self, gap: Array) -> None:
+        """Start from a new gap, at rest."""
+        self.gap, self._speed = gap, np.zeros_like(gap)
+
+    def close(self, dt_s: float, half_life_s: float) -> Array:
+        """The gap `dt_s` later; `half_life_s` is about the time in which half of it closes."""
+        stiffness = 2.0 * np.log(2.0) / half_life_s
+        pull = self._speed + stiffness * self.gap
+        decay = np.exp(-stiffness * dt_s)
+        self.gap = decay * (self.gap + pull * dt_s)
+        self._speed = decay * (self._speed - stiffness * pull * dt_s)
+        return self.gap
+
+
+class Presence:
+    """One hand as it is shown from tick to tick."""
+
+    def __init__(self, rest_angles: Array, limits: Array) -> None:
+        self._rest_angles, self._limits = rest_angles, limits
+        self._fingers, self._wrist = Ease(len(rest_angles)), Ease(6)
+        self._finger_source: Hashable = None
+        self._wrist_source: Hashable = None
+        self.shown: Shown | None = None
+
+    def show(
+        self, state: State, angles: Array | None, wrist: Array | None, source: Hashable, dt_s: float
+    ) -> Shown | None:
+        """The hand at the next tick, `dt_s` after the last one.
+
+        `angles (20,)` is the synthesised pose of a live hand; without it the fingers are held, or ease to rest.
+        `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays. `source` says what the
+        pose comes from: when it changes, the hand glides from what it showed. None before a wrist was ever seen.
+        """
+        if self.shown is None:
+            if wrist is None:
+                return None
+            start = self._rest_angles if angles is None else angles
+            self._finger_source, self._wrist_source = (state, source), source
+            self.shown = Shown(state, start, wrist)
+            return self.shown
+        self.shown = Shown(state, self._next_angles(state, angles, source, dt_s), self._next_wrist(wrist, source, dt_s))
+        return self.shown
+
+    def _next_angles(self, state: State, angles: Array | None, source: Hashable, dt_s: float) -> Array:
+        assert self.shown is not None
+        if angles is None and state != "rest":
+            self._finger_source = None
+            return self.shown.angles
+        target = self._rest_angles if angles is None else angles
+        if self._finger_source != (state, source):
+            self._finger_source = (state, source)
+            self._fingers.open(self.shown.angles - target)
+        half_life_s = REST_HALF_LIFE_S if angles is None else RETURN_HALF_LIFE_S
+        return np.clip(target + self._fingers.close(dt_s, half_life_s), self._limits[:, 0], self._limits[:, 1])
+
+    def _next_wrist(self, wrist: Array | None, source: Hashable, dt_s: float) -> Array:
+        assert self.shown is not None
+        if wrist is None:
+            self._wrist_source = None
+            return self.shown.wrist
+        if self._wrist_source != source:
+            self._wrist_source = source
+            turn = quat_log(quat_multiply(self.shown.wrist[3:], quat_conjugate(wrist[3:])))
+            self._wrist.open(np.concatenate([self.shown.wrist[:3] - wrist[:3], turn]))
+        gap = self._wrist.close(dt_s, RETURN_HALF_LIFE_S)
+        return np.concatenate([wrist[:3] + gap[:3], quat_multiply(quat_exp(gap[3:]), wrist[3:])])

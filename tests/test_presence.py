@@ -1,0 +1,103 @@
+"""A hand comes and goes without a jump, always inside its limits, always finite."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from manipnet.geometry import quat_exp, quat_log, quat_multiply
+from manipnet.hand.skeleton import DOF_LIMITS_RAD
+from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S, Presence, state_at_age
+from manipnet.timeline import TICK_S
+
+REST = DOF_LIMITS_RAD.mean(axis=1)
+FIST = DOF_LIMITS_RAD[:, 1].copy()
+HERE = np.array([0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0])
+THERE = np.concatenate([[0.6, 1.2, -0.3], quat_exp(np.array([0.0, 1.5, 0.3]))])
+
+
+def presence() -> Presence:
+    return Presence(REST, DOF_LIMITS_RAD)
+
+
+def run(hand: Presence, ticks: int, state, angles, wrist, source="a") -> list:
+    return [hand.show(state, angles, wrist, source, TICK_S) for _ in range(ticks)]
+
+
+@pytest.mark.parametrize(
+    ("age_s", "state"),
+    [(0.0, "live"), (HOLD_AFTER_S, "live"), (0.11, "hold"), (REST_AFTER_S, "hold"), (0.51, "rest"), (np.inf, "rest")],
+)
+def test_the_state_follows_the_age_of_the_tracking(age_s: float, state: str) -> None:
+    assert state_at_age(age_s) == state
+
+
+def test_nothing_is_shown_before_a_wrist_was_seen() -> None:
+    assert presence().show("rest", None, None, "a", TICK_S) is None
+
+
+def test_live_shows_what_was_synthesised_at_once() -> None:
+    shown = run(presence(), 2, "live", FIST, HERE)[-1]
+    assert np.array_equal(shown.angles, FIST)
+    assert np.array_equal(shown.wrist, HERE)
+
+
+def test_hold_keeps_fingers_and_wrist() -> None:
+    hand = presence()
+    run(hand, 5, "live", FIST, HERE)
+    shown = run(hand, 10, "hold", None, None)[-1]
+    assert np.array_equal(shown.angles, FIST)
+    assert np.array_equal(shown.wrist, HERE)
+    assert shown.state == "hold"
+
+
+def test_hold_keeps_the_fingers_on_a_wrist_that_is_still_tracked() -> None:
+    hand = presence()
+    run(hand, 5, "live", FIST, HERE)
+    shown = run(hand, 2, "hold", None, HERE + [0.01, 0, 0, 0, 0, 0, 0])[-1]
+    assert np.array_equal(shown.angles, FIST)
+    assert shown.wrist[0] == pytest.approx(0.11)
+
+
+def test_rest_eases_the_fingers_and_leaves_the_wrist() -> None:
+    hand = presence()
+    run(hand, 5, "live", FIST, HERE)
+    eased = [np.abs(s.angles - REST).max() for s in run(hand, 90, "rest", None, None)]
+    assert np.all(np.diff(eased) < 0.0)
+    assert eased[-1] < 0.02
+    assert hand.shown is not None
+    assert np.array_equal(hand.shown.wrist, HERE)
+
+
+def test_coming_back_glides_over_a_fifth_of_a_second() -> None:
+    hand = presence()
+    run(hand, 5, "live", REST, HERE)
+    run(hand, 60, "rest", None, None)
+    back = run(hand, 12, "live", FIST, THERE)
+    whole = np.abs(FIST - REST).max()
+    steps = [np.abs(a.angles - b.angles).max() for a, b in zip(back, back[1:], strict=False)]
+    assert max(steps) < 0.2 * whole
+    assert np.abs(back[-1].angles - FIST).max() < 0.12 * whole
+    assert np.linalg.norm(back[-1].wrist[:3] - THERE[:3]) < 0.12 * np.linalg.norm(HERE[:3] - THERE[:3])
+
+
+@given(data=st.data())
+@settings(max_examples=40, deadline=None)
+def test_no_sequence_of_events_makes_it_jump_leave_its_limits_or_lose_its_finiteness(data) -> None:
+    hand = presence()
+    low, high = DOF_LIMITS_RAD.T
+    previous = hand.show("live", REST, HERE, "start", TICK_S)
+    whole = (high - low).max()
+    for i in range(data.draw(st.integers(1, 12))):
+        state = data.draw(st.sampled_from(["live", "hold", "rest"]))
+        angles = low + (high - low) * data.draw(st.floats(0.0, 1.0)) if state == "live" else None
+        wrist = data.draw(st.sampled_from([HERE, THERE, None]))
+        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i):
+            assert np.isfinite(shown.angles).all()
+            assert np.isfinite(shown.wrist).all()
+            assert np.all((low <= shown.angles) & (shown.angles <= high))
+            assert np.abs(shown.angles - previous.angles).max() < 0.15 * whole
+            assert np.linalg.norm(shown.wrist[:3] - previous.wrist[:3]) < 0.15
+            turn = quat_log(quat_multiply(shown.wrist[3:], previous.wrist[3:] * np.array([-1, -1, -1, 1])))
+            assert np.linalg.norm(turn) < 0.3
+            previous = shown
