@@ -6,7 +6,6 @@ import subprocess
 import time
 
 import numpy as np
-import pytest
 from make_vectors import messages
 from pythonosc.osc_bundle import OscBundle
 from support import need

@@ -32,6 +32,7 @@ The two carpal angles multiply into what Unity calls ThumbProximal, so the thumb
 """
 
 _BONES = np.array(list(FINGER_BONES.values()))
+_LEVELS = ([1, 5, 8, 11, 14], [2, 6, 9, 12, 15], [3, 7, 10, 13, 16], [4])
 _BONE_PARENTS = np.where(PARENTS[_BONES] == 1, 0, PARENTS[_BONES])
 _ZERO_POSITIONS, _zero_matrices = forward_kinematics(np.zeros(DOF_COUNT))
 _ZERO = matrix_to_quat(_zero_matrices)
@@ -111,8 +112,8 @@ def _turns_from_t_pose(local: Array, correction: Array) -> Array:
     """How far each bone of a right hand is turned from the T-pose, `(17, 4)`, in the T-pose's project frame."""
     world = np.empty((BONE_COUNT, 4))
     world[0] = [0.0, 0.0, 0.0, 1.0]
-    for bone in range(1, BONE_COUNT):
-        world[bone] = quat_multiply(world[PARENTS[bone]], local[bone])
+    for bones in _LEVELS:
+        world[bones] = quat_multiply(world[PARENTS[bones]], local[bones])
     turns = quat_multiply(quat_multiply(world, quat_conjugate(_ZERO)), correction)
     return quat_multiply(quat_multiply(_WRIST_TO_T_POSE, turns), quat_conjugate(_WRIST_TO_T_POSE))
 
