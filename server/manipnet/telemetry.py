@@ -21,6 +21,7 @@ DROP_REASONS = (
     "rate",  # a source that sends garbage faster than it is worth reading
     "kernel",  # lost in the socket's buffer before it was read
     "unsupported",  # a version or message kind that is not understood
+    "incomplete",  # a part of the frame did not arrive
     "duplicate",  # the same instant twice
     "internal",  # a fault of our own while a frame was taken in
     "late",  # older than what was already accepted

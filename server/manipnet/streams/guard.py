@@ -1,8 +1,12 @@
 """Which messages are worth reading when somebody floods a port: decided before a byte of them is parsed."""
 
+import ipaddress
+from collections.abc import Sequence
+
 STRANGERS_PER_S = 500
 FAULTS_PER_S = 50
 MAX_SOURCES = 256
+Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
 
 class SourceGuard:
@@ -46,3 +50,21 @@ class SourceGuard:
             self._faults[source] = self._faults.get(source, 0) + 1
         if self._faults.get(source, 0) >= FAULTS_PER_S:
             self._known.pop(source, None)
+
+
+class AllowList:
+    """Whether an address is in one of the networks; remembers the latest answers. None allows all."""
+
+    def __init__(self, networks: Sequence[Network] | None) -> None:
+        self._networks = networks
+        self._answers: dict[str, bool] = {}
+
+    def __call__(self, host: str) -> bool:
+        if self._networks is None:
+            return True
+        if host not in self._answers:
+            if len(self._answers) >= MAX_SOURCES:
+                self._answers.clear()
+            address = ipaddress.ip_address(host.partition("%")[0])
+            self._answers[host] = any(address in network for network in self._networks)
+        return self._answers[host]
