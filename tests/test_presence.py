@@ -1,5 +1,7 @@
 """A hand comes and goes without a jump, always inside its limits, always finite."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
 from manipnet.hand.skeleton import DOF_LIMITS_RAD
-from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S, Presence, state_at_age
+from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S, Presence, Shown, State, state_at_age
 from manipnet.timeline import TICK_S
 
 REST = DOF_LIMITS_RAD.mean(axis=1)
@@ -20,8 +22,9 @@ def presence() -> Presence:
     return Presence(REST, DOF_LIMITS_RAD)
 
 
-def run(hand: Presence, ticks: int, state, angles, wrist, source="a") -> list:
-    return [hand.show(state, angles, wrist, source, TICK_S) for _ in range(ticks)]
+def run(hand: Presence, ticks: int, state: State, angles, wrist, run: int = 0, held: object = "mug") -> list[Shown]:
+    shown = [hand.show(state, angles, wrist, run, held, TICK_S) for _ in range(ticks)]
+    return [each for each in shown if each is not None]
 
 
 @pytest.mark.parametrize(
@@ -33,7 +36,7 @@ def test_the_state_follows_the_age_of_the_tracking(age_s: float, state: str) -> 
 
 
 def test_nothing_is_shown_before_a_wrist_was_seen() -> None:
-    assert presence().show("rest", None, None, "a", TICK_S) is None
+    assert presence().show("rest", None, None, 0, None, TICK_S) is None
 
 
 def test_live_shows_what_was_synthesised_at_once() -> None:
@@ -54,7 +57,7 @@ def test_hold_keeps_fingers_and_wrist() -> None:
 def test_hold_keeps_the_fingers_on_a_wrist_that_is_still_tracked() -> None:
     hand = presence()
     run(hand, 5, "live", FIST, HERE)
-    shown = run(hand, 2, "hold", None, HERE + [0.01, 0, 0, 0, 0, 0, 0])[-1]
+    shown = run(hand, 2, "hold", None, HERE + 0.01 * np.eye(7)[0])[-1]
     assert np.array_equal(shown.angles, FIST)
     assert shown.wrist[0] == pytest.approx(0.11)
 
@@ -75,7 +78,7 @@ def test_coming_back_glides_over_a_fifth_of_a_second() -> None:
     run(hand, 60, "rest", None, None)
     back = run(hand, 12, "live", FIST, THERE)
     whole = np.abs(FIST - REST).max()
-    steps = [np.abs(a.angles - b.angles).max() for a, b in zip(back, back[1:], strict=False)]
+    steps = [np.abs(a.angles - b.angles).max() for a, b in pairwise(back)]
     assert max(steps) < 0.2 * whole
     assert np.abs(back[-1].angles - FIST).max() < 0.12 * whole
     assert np.linalg.norm(back[-1].wrist[:3] - THERE[:3]) < 0.12 * np.linalg.norm(HERE[:3] - THERE[:3])
@@ -86,13 +89,13 @@ def test_coming_back_glides_over_a_fifth_of_a_second() -> None:
 def test_no_sequence_of_events_makes_it_jump_leave_its_limits_or_lose_its_finiteness(data) -> None:
     hand = presence()
     low, high = DOF_LIMITS_RAD.T
-    previous = hand.show("live", REST, HERE, "start", TICK_S)
+    (previous,) = run(hand, 1, "live", REST, HERE, -1)
     whole = (high - low).max()
     for i in range(data.draw(st.integers(1, 12))):
         state = data.draw(st.sampled_from(["live", "hold", "rest"]))
         angles = low + (high - low) * data.draw(st.floats(0.0, 1.0)) if state == "live" else None
         wrist = data.draw(st.sampled_from([HERE, THERE, None]))
-        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i):
+        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i, i):
             assert np.isfinite(shown.angles).all()
             assert np.isfinite(shown.wrist).all()
             assert np.all((low <= shown.angles) & (shown.angles <= high))

@@ -71,44 +71,44 @@ class Presence:
         self.shown: Shown | None = None
 
     def show(
-        self, state: State, angles: Array | None, wrist: Array | None, source: Hashable, dt_s: float
+        self, state: State, angles: Array | None, wrist: Array | None, run: int, held: Hashable, dt_s: float
     ) -> Shown | None:
         """The hand at the next tick, `dt_s` after the last one.
 
         `angles (20,)` is the synthesised pose of a live hand; without it the fingers are held, or ease to rest.
-        `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays. `source` says what the
-        pose comes from: when it changes, the hand glides from what it showed. None before a wrist was ever seen.
+        `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays. When the `run` of the
+        stream or the object `held` changes, the hand glides from what it showed. None before a wrist was seen.
         """
+        source = (state, run, held)
         if self.shown is None:
             if wrist is None:
                 return None
-            start = self._rest_angles if angles is None else angles
-            self._finger_source, self._wrist_source = (state, source), source
-            self.shown = Shown(state, start, wrist)
-            return self.shown
-        self.shown = Shown(state, self._next_angles(state, angles, source, dt_s), self._next_wrist(wrist, source, dt_s))
+            self._finger_source, self._wrist_source = source, run
+            self.shown = Shown(state, self._rest_angles if angles is None else angles, wrist)
+        else:
+            fingers = self._next_angles(self.shown.angles, state, angles, source, dt_s)
+            self.shown = Shown(state, fingers, self._next_wrist(self.shown.wrist, wrist, run, dt_s))
         return self.shown
 
-    def _next_angles(self, state: State, angles: Array | None, source: Hashable, dt_s: float) -> Array:
-        assert self.shown is not None
+    def _next_angles(self, shown: Array, state: State, angles: Array | None, source: Hashable, dt_s: float) -> Array:
         if angles is None and state != "rest":
             self._finger_source = None
-            return self.shown.angles
+            return shown
         target = self._rest_angles if angles is None else angles
-        if self._finger_source != (state, source):
-            self._finger_source = (state, source)
-            self._fingers.open(self.shown.angles - target)
+        if self._finger_source != source:
+            self._finger_source = source
+            self._fingers.open(shown - target)
         half_life_s = REST_HALF_LIFE_S if angles is None else RETURN_HALF_LIFE_S
-        return np.clip(target + self._fingers.close(dt_s, half_life_s), self._limits[:, 0], self._limits[:, 1])
+        eased = target + self._fingers.close(dt_s, half_life_s)
+        return np.clip(eased, self._limits[:, 0], self._limits[:, 1])
 
-    def _next_wrist(self, wrist: Array | None, source: Hashable, dt_s: float) -> Array:
-        assert self.shown is not None
+    def _next_wrist(self, shown: Array, wrist: Array | None, source: Hashable, dt_s: float) -> Array:
         if wrist is None:
             self._wrist_source = None
-            return self.shown.wrist
+            return shown
         if self._wrist_source != source:
             self._wrist_source = source
-            turn = quat_log(quat_multiply(self.shown.wrist[3:], quat_conjugate(wrist[3:])))
-            self._wrist.open(np.concatenate([self.shown.wrist[:3] - wrist[:3], turn]))
+            turn = quat_log(quat_multiply(shown[3:], quat_conjugate(wrist[3:])))
+            self._wrist.open(np.concatenate([shown[:3] - wrist[:3], turn]))
         gap = self._wrist.close(dt_s, RETURN_HALF_LIFE_S)
         return np.concatenate([wrist[:3] + gap[:3], quat_multiply(quat_exp(gap[3:]), wrist[3:])])
