@@ -7,9 +7,7 @@ from manipnet import geometry
 from manipnet_tools import metrics, physics
 
 RADIUS = 0.04
-SPHERE = physics.Body(
-    np.zeros(3), 0.4 * RADIUS**2 * np.eye(3), RADIUS * np.concatenate([np.eye(3), -np.eye(3)])
-)
+SPHERE = physics.Body(np.zeros(3), 0.4 * RADIUS**2 * np.eye(3), RADIUS * np.concatenate([np.eye(3), -np.eye(3)]))
 BRICK = physics.Body(np.array([0.01, 0.02, 0.0]), np.diag([1e-3, 2e-3, 4e-3]), np.zeros((1, 3)))
 TIME = np.arange(120) / 60.0
 WEIGHT = np.array([0.0, physics.GRAVITY_M_S2, 0.0])

@@ -1,0 +1,65 @@
+"""The offline driver: what it shows the synthesis, and that it steps all hands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from manipnet import geometry
+from manipnet_tools.rollout import tick_take
+from manipnet_tools.takes import BodyTrack, Take
+
+NAMES = ("left_wrist", "right_wrist", "box")
+VELOCITY = np.array([0.1, -0.2, 0.3])
+SPIN = np.array([0.0, 1.5, 0.0])
+
+
+def steady_take(rate_hz: float, seconds: float = 3.0) -> Take:
+    """All bodies move and turn steadily, on a clock that does not start at zero."""
+    time = np.arange(round(seconds * rate_hz)) / rate_hz
+    track = BodyTrack(steady_poses(time), np.ones(len(time), dtype=np.bool_))
+    return Take("steady", rate_hz, 100.0 + time, dict.fromkeys(NAMES, track))
+
+
+def steady_poses(time: np.ndarray) -> np.ndarray:
+    return np.concatenate([VELOCITY * time[..., None], geometry.quat_exp(SPIN * time[..., None])], axis=-1)
+
+
+@pytest.mark.parametrize(("rate_hz", "tolerance"), [(48.0, 1e-3), (60.0, 1e-9), (120.0, 1e-9), (333.0, 1e-3)])
+def test_ticks_are_sixty_a_second_at_any_rate(rate_hz, tolerance):
+    # where no sample falls on the end of the window, live would not have the next one yet: it is a forecast
+    ticks = tick_take(steady_take(rate_hz))
+    np.testing.assert_allclose(np.diff(ticks.time_s), 1 / 60, atol=1e-9)
+    assert ticks.time_s[0] == pytest.approx(0.5 + 1 / 60)
+    assert 2.5 - 2 / rate_hz < ticks.time_s[-1] < 2.5 + 1 / 60
+    instants = ticks.time_s[:, None] - 1 / 60 + np.linspace(-0.5, 0.5, 21)
+    for body in ticks.bodies.values():
+        np.testing.assert_allclose(body.windows, steady_poses(instants), atol=tolerance)
+        np.testing.assert_allclose(body.poses, steady_poses(ticks.time_s), atol=1e-5)
+
+
+def test_a_shorter_look_ahead_sees_a_forecast_and_loses_less_of_the_end():
+    full, short = tick_take(steady_take(120.0)), tick_take(steady_take(120.0), look_ahead_s=0.1)
+    assert len(short.time_s) == len(full.time_s) + 24
+    seen, guessed = (ticks[: len(full.time_s)].bodies["box"].windows for ticks in (full, short))
+    np.testing.assert_allclose(guessed[:, :13], seen[:, :13], atol=1e-6)
+    assert np.abs(guessed[:, -1] - seen[:, -1]).max() > 0.01
+
+
+def test_a_body_that_is_not_seen_contributes_nothing():
+    take = steady_take(120.0)
+    poses, seen = take.bodies["box"].poses.copy(), take.bodies["box"].tracked.copy()
+    hidden = (take.time_s > 101.0) & (take.time_s < 101.1)
+    poses[hidden], seen[hidden] = np.nan, False
+    ticks = tick_take(replace(take, bodies=take.bodies | {"box": BodyTrack(poses, seen)}))
+    windows = ticks.bodies["box"].windows
+    instants = ticks.time_s[:, None] - 1 / 60 + np.linspace(-0.5, 0.5, 21)
+    assert np.isfinite(windows).all()
+    np.testing.assert_allclose(windows[:, :10], steady_poses(instants)[:, :10], atol=1e-6)
+
+
+def test_slices_keep_all_columns_together():
+    ticks = tick_take(steady_take(60.0))
+    part = ticks[5:9]
+    np.testing.assert_array_equal(part.time_s, ticks.time_s[5:9])
+    np.testing.assert_array_equal(part.bodies["box"].poses, ticks.bodies["box"].poses[5:9])
