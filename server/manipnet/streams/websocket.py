@@ -1,0 +1,100 @@
+"""Hands out to browsers: each binary WebSocket message is one `pose/bin` payload, the newest wins."""
+
+import asyncio
+import contextlib
+import re
+import threading
+
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Origin
+
+MAX_CLIENTS = 32
+MAX_REQUEST_BYTES = 1024
+"""Clients have nothing to say."""
+
+LOCAL_PAGES = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
+"""Pages that may connect; any other web site open in the same browser may not watch. Programs send no origin."""
+
+_TRY_AGAIN_LATER = 1013
+
+
+class WebSocketPublisher:
+    """Serves on its own thread from construction to `stop`. A client that reads slowly skips messages.
+
+    Raises `OSError` when the address cannot be bound.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self._clients: set[asyncio.Event] = set()
+        self._payload = b""
+        self._loop = asyncio.new_event_loop()
+        try:
+            self._server = self._loop.run_until_complete(self._serve(host, port))
+        except BaseException:
+            self._loop.close()
+            raise
+        port = self._server.sockets[0].getsockname()[1]
+        self.address = f"ws://[{host}]:{port}" if ":" in host else f"ws://{host}:{port}"
+        self._thread = threading.Thread(target=self._loop.run_forever, name="websocket-out", daemon=True)
+        self._thread.start()
+
+    @property
+    def client_count(self) -> int:
+        """How many clients are connected."""
+        return len(self._clients)
+
+    def publish(self, payload: bytes) -> None:
+        """Offer a payload to every client; returns at once, from any thread."""
+        with contextlib.suppress(RuntimeError):  # the loop is closed: stopping
+            self._loop.call_soon_threadsafe(self._offer, payload)
+
+    def stop(self) -> None:
+        """Close all connections and the thread."""
+        if self._loop.is_closed():
+            return
+        asyncio.run_coroutine_threadsafe(self._close(), self._loop).result()
+        self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join()
+        self._loop.close()
+
+    async def _serve(self, host: str, port: int):
+        origins: list[Origin | re.Pattern[str] | None] = [None, LOCAL_PAGES]
+        return await serve(
+            self._feed, host, port, origins=origins, compression=None, max_size=MAX_REQUEST_BYTES, close_timeout=1
+        )
+
+    async def _close(self) -> None:
+        self._server.close()
+        await self._server.wait_closed()
+
+    def _offer(self, payload: bytes) -> None:
+        self._payload = payload
+        for news in self._clients:
+            news.set()
+
+    async def _feed(self, connection: ServerConnection) -> None:
+        """Send what is newest whenever the client has taken the last."""
+        if len(self._clients) >= MAX_CLIENTS:
+            await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_CLIENTS} clients")
+            return
+        news = asyncio.Event()
+        self._clients.add(news)
+        drain = asyncio.create_task(self._ignore(connection, news))
+        try:
+            while True:
+                await news.wait()
+                news.clear()
+                await connection.send(self._payload)
+        except ConnectionClosed:
+            pass
+        finally:
+            self._clients.discard(news)
+            drain.cancel()
+
+    async def _ignore(self, connection: ServerConnection, news: asyncio.Event) -> None:
+        """Read and forget, so that a closed connection is noticed even while nothing is published."""
+        with contextlib.suppress(ConnectionClosed):
+            async for _ in connection:
+                pass
+        news.set()
