@@ -23,7 +23,7 @@ from manipnet.network.layout import (
 from manipnet.objects.shape import Shape
 from manipnet.sensing.ambient import sense_ambient
 from manipnet.sensing.distance import sense_distances
-from manipnet.sensing.proximity import SENSOR_COUNT, aim_rays, place_sensors, proximity
+from manipnet.sensing.proximity import SENSOR_COUNT, SENSORS, aim_rays, place_sensors, proximity
 from manipnet.sensing.scene import object_from_wrist, quat_to_matrix_into
 
 _POSITIONS, _AXES = INPUT["joint_positions"].start, INPUT["joint_axes"].start
@@ -59,6 +59,7 @@ def features(shape: Shape, windows: Windows, positions: Array, rotations: Array)
     rows = np.empty((count, INPUT_SIZE), np.float32)
     rays = np.empty((2, count, _SENSED_COUNT, SENSOR_COUNT, 3), np.float32)
     _features_without_rays(
+        SENSORS,
         shape.bvh,
         shape.field,
         shape.exact_within_m,
@@ -170,7 +171,7 @@ def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
 
 @njit(cache=True, nogil=True)
 def _features_without_rays(
-    bvh, field, exact_within_m, center_of_mass, windows, positions, rotations, rows, rays
+    sensors, bvh, field, exact_within_m, center_of_mass, windows, positions, rotations, rows, rays
 ):
     rotation, translation = np.empty((3, 3)), np.empty(3)
     points, directions = np.empty((SENSOR_COUNT, 3)), np.empty((SENSOR_COUNT, 3))
@@ -187,7 +188,7 @@ def _features_without_rays(
             center_of_mass,
             row,
         )
-        place_sensors(positions[n], rotations[n], points, directions)
+        place_sensors(sensors, positions[n], rotations[n], points, directions)
         for s in range(_SENSED_COUNT):
             t = SENSED[s]
             object_from_wrist(

@@ -1,8 +1,11 @@
 """Proximity sensors: rays off 104 points of the palm side (paper, section 5.2)."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
+from manipnet.geometry import Array
 from manipnet.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
 from manipnet.objects.rays import RayScene
 from manipnet.sensing.scene import SENSOR_RANGE_M
@@ -10,21 +13,34 @@ from manipnet.sensing.scene import SENSOR_RANGE_M
 SENSOR_COUNT = len(SENSOR_BONES)
 
 
+class Sensors(NamedTuple):
+    """Points of the skin with the bones they follow: an argument of the kernels, because compiled code is cached by
+    its own file and would not notice another surface."""
+
+    bones: np.ndarray
+    weights: Array
+    points: Array
+    normals: Array
+
+
+SENSORS = Sensors(SENSOR_BONES, SENSOR_WEIGHTS, SENSOR_POINTS, SENSOR_NORMALS)
+
+
 @njit(cache=True, nogil=True)
-def place_sensors(positions, rotations, points, normals):
+def place_sensors(sensors, positions, rotations, points, normals):
     """Skin the sensors to a pose: `positions (22, 3)`, `rotations (17, 3, 3)` into `points`, `normals (104, 3)`."""
     for s in range(SENSOR_COUNT):
         points[s] = 0.0
         normals[s] = 0.0
-        for k in range(SENSOR_BONES.shape[1]):
-            weight, bone = SENSOR_WEIGHTS[s, k], SENSOR_BONES[s, k]
+        for k in range(sensors.bones.shape[1]):
+            weight, bone = sensors.weights[s, k], sensors.bones[s, k]
             if weight == 0.0:
                 continue
             for i in range(3):
                 p, n = positions[bone, i], 0.0
                 for j in range(3):
-                    p += rotations[bone, i, j] * SENSOR_POINTS[s, k, j]
-                    n += rotations[bone, i, j] * SENSOR_NORMALS[s, k, j]
+                    p += rotations[bone, i, j] * sensors.points[s, k, j]
+                    n += rotations[bone, i, j] * sensors.normals[s, k, j]
                 points[s, i] += weight * p
                 normals[s, i] += weight * n
         length = np.sqrt(normals[s, 0] ** 2 + normals[s, 1] ** 2 + normals[s, 2] ** 2)

@@ -1,0 +1,100 @@
+"""Solvers: reachable targets are reached within limits, capsules leave the object, angles stay inside limits."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, DOF_LIMITS_RAD
+from manipnet.ik.ccd import solve_ccd
+from manipnet.ik.least_squares import solve_least_squares
+from manipnet.ik.targets import mix_distances, place_targets
+from manipnet.objects.mesh import closed_mesh
+from manipnet.objects.shape import build_shape
+
+LOW, HIGH = DOF_LIMITS_RAD.T
+FAR = np.array([5.0, 5.0, 5.0])
+fractions = arrays(np.float64, 20, elements=st.floats(0.15, 0.85))
+nudges = arrays(np.float64, 20, elements=st.floats(-0.15, 0.15))
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory):
+    mesh = trimesh.creation.icosphere(subdivisions=3, radius=0.03)
+    return build_shape(closed_mesh(mesh.vertices, mesh.faces, "ball"), tmp_path_factory.mktemp("cache"))
+
+
+def solve(name, ball, angles, targets, center=FAR):
+    """Solve with the ball at `center` of the wrist frame."""
+    angles = angles.copy()
+    if name == "ccd":
+        solve_ccd(angles, targets, DOF_LIMITS_RAD)
+    else:
+        solve_least_squares(angles, targets, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0)
+    return angles
+
+
+@pytest.mark.parametrize(("name", "within_m"), [("ccd", 2e-3), ("least_squares", 1.5e-3)])
+@settings(deadline=None)
+@given(fraction=fractions, nudge=nudges)
+def test_reachable_targets_are_reached(ball, name, within_m, fraction, nudge):
+    goal = np.clip(LOW + fraction * (HIGH - LOW), LOW, HIGH)
+    targets, _ = forward_kinematics(goal)
+    start = np.clip(goal + nudge, LOW, HIGH)
+    solved = solve(name, ball, start, targets)
+    before = np.linalg.norm(forward_kinematics(start)[0] - targets, axis=1)
+    after = np.linalg.norm(forward_kinematics(solved)[0] - targets, axis=1)
+    assert after.max() <= max(within_m, 0.35 * before.max())
+
+
+@pytest.mark.parametrize("name", ["ccd", "least_squares"])
+@settings(deadline=None)
+@given(fraction=fractions, shift=arrays(np.float64, (22, 3), elements=st.floats(-0.1, 0.1)))
+def test_limits_hold_whatever_the_targets(ball, name, fraction, shift):
+    start = LOW + fraction * (HIGH - LOW)
+    targets = forward_kinematics(start)[0] + shift
+    solved = solve(name, ball, start, targets)
+    assert np.all(np.isfinite(solved))
+    assert np.all(solved >= LOW)
+    assert np.all(solved <= HIGH)
+
+
+def capsule_depth(positions, center):
+    fraction = np.linspace(0.0, 1.0, 9)[:, None, None]
+    start, end = positions[CAPSULE_JOINTS[4:, 0]], positions[CAPSULE_JOINTS[4:, 1]]
+    gap = np.linalg.norm(start + fraction * (end - start) - center, axis=-1) - 0.03 - CAPSULE_RADII_M[4:]
+    return np.maximum(-gap.min(axis=0), 0.0)
+
+
+def test_fingers_leave_the_object(ball):
+    start = np.tile([0.3, 0.2, 0.4, 0.3], 5)
+    start[:4] = 0.0
+    positions, _ = forward_kinematics(start)
+    center = positions[9] + np.array([0.0, 0.0, -0.03])
+    solved = solve("least_squares", ball, start, positions, center)
+    deep, left = capsule_depth(positions, center), capsule_depth(forward_kinematics(solved)[0], center)
+    assert deep.max() > 0.008
+    assert left.max() < 0.5 * deep.max()
+    assert left.mean() < 0.4 * deep.mean()
+
+
+def test_targets_follow_appendix_b(ball):
+    center = np.array([0.2, 0.0, 0.0])
+    positions = np.zeros((22, 3))
+    positions[:, 0] = 0.2 - 0.03 - np.linspace(-0.01, 0.05, 22)
+    distances = np.full(22, 0.008)
+    distances[-1] = 0.03
+    targets = np.empty((22, 3))
+    place_targets(ball.bvh, ball.field, np.eye(3), -center, 1.0, np.inf, positions, distances, targets)
+    measured = ball.signed_distance(positions - center)[0]
+    wanted = [mix_distances(0.008, d) for d in measured[:-1]]
+    np.testing.assert_allclose(ball.signed_distance(targets[:-1] - center)[0], wanted, atol=1e-4)
+    np.testing.assert_array_equal(targets[-1], positions[-1])
+
+
+def test_mixing_trusts_the_prediction_inside_and_the_position_outside():
+    assert mix_distances(0.01, -0.01) == pytest.approx(0.8 * 0.01 - 0.2 * 0.01)
+    assert mix_distances(0.01, 0.02) == pytest.approx(0.2 * 0.01 + 0.8 * 0.02)
