@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
 from manipnet.hand.skeleton import DOF_LIMITS_RAD
+from manipnet.output_guard import MAX_SPEED_RAD_S, NotFiniteError, OutputGuard
 from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S, Presence, Shown, State, state_at_age
+from manipnet.telemetry import Counters
 from manipnet.timeline import TICK_S
 
 REST = DOF_LIMITS_RAD.mean(axis=1)
@@ -19,7 +21,7 @@ THERE = np.concatenate([[0.6, 1.2, -0.3], quat_exp(np.array([0.0, 1.5, 0.3]))])
 
 
 def presence() -> Presence:
-    return Presence(REST, DOF_LIMITS_RAD)
+    return Presence(REST, OutputGuard(DOF_LIMITS_RAD, Counters()))
 
 
 def run(hand: Presence, ticks: int, state: State, angles, wrist, run: int = 0, held: object = "mug") -> list[Shown]:
@@ -104,3 +106,22 @@ def test_no_sequence_of_events_makes_it_jump_leave_its_limits_or_lose_its_finite
             turn = quat_log(quat_multiply(shown.wrist[3:], previous.wrist[3:] * np.array([-1, -1, -1, 1])))
             assert np.linalg.norm(turn) < 0.3
             previous = shown
+
+
+def test_a_pose_that_is_not_finite_is_refused_and_changes_nothing() -> None:
+    hand = presence()
+    before = run(hand, 3, "live", FIST, HERE)[-1]
+    with pytest.raises(NotFiniteError):
+        hand.show("live", np.where(np.arange(20) == 7, np.nan, FIST), HERE, 0, "mug", TICK_S)
+    assert hand.shown is before
+
+
+def test_angles_outside_the_limits_or_too_fast_are_kept_in_and_counted() -> None:
+    counters = Counters()
+    hand = Presence(REST, OutputGuard(DOF_LIMITS_RAD, counters))
+    run(hand, 1, "live", DOF_LIMITS_RAD[:, 0], HERE)
+    (shown,) = run(hand, 1, "live", FIST + 1.0, HERE)
+    steps = shown.angles - DOF_LIMITS_RAD[:, 0]
+    assert steps.max() == pytest.approx(MAX_SPEED_RAD_S * TICK_S)
+    assert np.all(shown.angles <= FIST)
+    assert counters.snapshot()["output_guarded"] == {"limit": 1, "speed": 1}

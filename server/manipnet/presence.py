@@ -7,9 +7,9 @@ from typing import Final, Literal
 import numpy as np
 
 from manipnet.geometry import Array, quat_conjugate, quat_exp, quat_log, quat_multiply
+from manipnet.output_guard import OutputGuard
 
 State = Literal["live", "hold", "rest"]
-WORST_FIRST: Final[tuple[State, ...]] = ("rest", "hold", "live")
 
 HOLD_AFTER_S: Final = 0.1
 REST_AFTER_S: Final = 0.5
@@ -63,8 +63,8 @@ class Ease:
 class Presence:
     """One hand as it is shown from tick to tick."""
 
-    def __init__(self, rest_angles: Array, limits: Array) -> None:
-        self._rest_angles, self._limits = rest_angles, limits
+    def __init__(self, rest_angles: Array, guard: OutputGuard) -> None:
+        self._rest_angles, self._guard = rest_angles, guard
         self._fingers, self._wrist = Ease(len(rest_angles)), Ease(6)
         self._finger_source: Hashable = None
         self._wrist_source: Hashable = None
@@ -78,7 +78,10 @@ class Presence:
         `angles (20,)` is the synthesised pose of a live hand; without it the fingers are held, or ease to rest.
         `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays. When the `run` of the
         stream or the object `held` changes, the hand glides from what it showed. None before a wrist was seen.
+        Raises `NotFiniteError` and changes nothing.
         """
+        if angles is not None:
+            self._guard.finite(angles)
         source = (state, run, held)
         if self.shown is None:
             if wrist is None:
@@ -99,8 +102,7 @@ class Presence:
             self._finger_source = source
             self._fingers.open(shown - target)
         half_life_s = REST_HALF_LIFE_S if angles is None else RETURN_HALF_LIFE_S
-        eased = target + self._fingers.close(dt_s, half_life_s)
-        return np.clip(eased, self._limits[:, 0], self._limits[:, 1])
+        return self._guard.within(target + self._fingers.close(dt_s, half_life_s), shown, dt_s)
 
     def _next_wrist(self, shown: Array, wrist: Array | None, source: Hashable, dt_s: float) -> Array:
         if wrist is None:

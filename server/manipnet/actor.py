@@ -1,0 +1,211 @@
+"""One actor: which streamed bodies are its wrists and props, and its two hands from tick to tick."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from manipnet.config import ActorConfig, BodyKey
+from manipnet.geometry import Array, compose
+from manipnet.network.bundle import Bundle
+from manipnet.output_guard import OutputGuard
+from manipnet.presence import HOLD_AFTER_S, Presence, Shown, State, state_at_age
+from manipnet.props import Prop, choose_prop
+from manipnet.streams.bodies import BodyFrame, BodySample
+from manipnet.synthesis import HandScene, HandState, HandStep, Side, state_of
+from manipnet.telemetry import Counters
+from manipnet.timeline import TICK_S, BodyAtTick, Tick, Timeline
+
+SIDES: Final[tuple[Side, Side]] = ("left", "right")
+AT_REST_RAD: Final = 0.03
+"""Fingers this near to the rest pose are there."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShownHand:
+    """One hand as an actor shows it at a tick, and the prop its fingers belong to."""
+
+    shown: Shown
+    prop: str | None
+
+
+class Hand:
+    """One hand's memory: what it was synthesised to, what it shows, and which prop it is about."""
+
+    def __init__(self, side: Side, bundle: Bundle, counters: Counters) -> None:
+        self.side: Side = side
+        self.prop: str | None = None
+        self.resting = False
+        """Asked to rest: no synthesis until the hand has eased there."""
+        self._rest_angles = bundle.rest_angles
+        self._presence = Presence(bundle.rest_angles, OutputGuard(bundle.limits, counters))
+        self.memory = state_of(bundle.rest_angles)
+
+    @property
+    def shown(self) -> Shown | None:
+        """What was shown last."""
+        return self._presence.shown
+
+    def show(self, state: State, step: HandStep | None, wrist: Array | None, run: int, dt_s: float) -> ShownHand | None:
+        """The hand `dt_s` after the last tick: live with a `step`, else held or on its way to rest."""
+        if state == "live" and step is None:
+            state = "hold"
+        angles = None if step is None else step.state.angles
+        if state == "rest":
+            self.prop = None
+        shown = self._presence.show(state, angles, wrist, run, self.prop, dt_s)
+        if step is not None:
+            self.memory = step.state
+        elif state == "rest":
+            self.memory = state_of(self._rest_angles)
+        return None if shown is None else ShownHand(shown, self.prop)
+
+    def recover(self) -> None:
+        """Go on from what is shown: the memory cannot be trusted."""
+        self.memory = state_of(self._rest_angles if self.shown is None else self.shown.angles)
+
+    def at_rest(self) -> bool:
+        """Whether the fingers have reached the rest pose."""
+        return self.shown is None or bool(np.abs(self.shown.angles - self._rest_angles).max() < AT_REST_RAD)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What one tick of one actor needs: the scenes to synthesise, and the state of each hand before it."""
+
+    tick: Tick
+    states: Mapping[Side, State]
+    scenes: Mapping[Side, HandScene]
+    memories: Mapping[Side, HandState]
+
+
+class Actor:
+    """An actor's bodies in, its hands out. Not thread-safe: belongs to the tick thread."""
+
+    def __init__(
+        self, config: ActorConfig, props: Sequence[Prop], bundle: Bundle, counters: Counters, look_ahead_s: float
+    ) -> None:
+        self.config = config
+        self.timeline = Timeline(look_ahead_s)
+        self.props = list(props)
+        self.seq = 0
+        sides: list[Side] = [side for side in SIDES if f"{side}_wrist" in config.wrists]
+        self.hands: dict[Side, Hand] = {side: Hand(side, bundle, counters) for side in sides}
+            side: Hand(side, bundle, counters) for side in SIDES if f"{side}_wrist" in config.wrists
+        }
+        self._parts = _parts(config)
+        self._last: tuple[int, int] | None = None
+
+    def push(self, frame: BodyFrame) -> str | None:
+        """Take what a frame holds of this actor; returns why nothing of it was used, or None."""
+        poses: dict[str, Array | None] = {}
+        for sample in frame.bodies:
+            part = self._parts.get(sample.id) if sample.id is not None else None
+            part = part or (self._parts.get(sample.name) if sample.name is not None else None)
+            if part is not None:
+                poses[part[0]] = _pose(sample, part[1]) if sample.tracked else None
+        if not poses:
+            return "unknown_body"
+        return self.timeline.push(frame.t_s, poses, frame.t_received_s, frame.source)
+
+    def carry(self, key: BodyKey, prop: Prop) -> None:
+        """Let the body `key` carry `prop`, whatever it carried before."""
+        self.props = [other for other in self.props if other.name != prop.name] + [prop]
+        for alias in _aliases(key):
+            self._parts[alias] = (prop.name, self._parts.get(alias, ("", None))[1])
+
+    def rest(self) -> None:
+        """Ease both hands to the rest pose; they are synthesised anew from there."""
+        for hand in self.hands.values():
+            hand.resting = True
+
+    def plan(self, tick: Tick) -> Plan:
+        """Who of this actor is to be synthesised at this tick, and from what."""
+        states: dict[Side, State] = {}
+        scenes: dict[Side, HandScene] = {}
+        for side, hand in self.hands.items():
+            wrist = tick.bodies.get(f"{side}_wrist")
+            prop = None if wrist is None else choose_prop(side, wrist.pose, self.props, tick.bodies, hand.prop)
+            thing = None if prop is None else tick.bodies[prop.name]
+            states[side] = self._state(hand, wrist, thing)
+            if prop is not None:
+                hand.prop = prop.name
+            if states[side] == "live" and wrist is not None and prop is not None and thing is not None:
+                scenes[side] = self._scene(side, wrist, tick.bodies.get(f"{_other(side)}_wrist"), thing, prop)
+        return Plan(tick, states, scenes, {side: self.hands[side].memory for side in scenes})
+
+    def show(self, plan: Plan, steps: Mapping[Side, HandStep]) -> dict[Side, ShownHand]:
+        """Both hands at the plan's tick, from the steps that were synthesised for it.
+
+        Raises `NotFiniteError`, after which `hold` shows the tick.
+        """
+        dt_s = self._elapsed_s(plan.tick)
+        hands: dict[Side, ShownHand] = {}
+        for side, hand in self.hands.items():
+            wrist = plan.tick.bodies.get(f"{side}_wrist")
+            tracked = wrist is not None and (wrist.age_s <= HOLD_AFTER_S)
+            pose = wrist.pose if wrist is not None and (tracked or hand.shown is None) else None
+            shown = hand.show(plan.states[side], steps.get(side), pose, plan.tick.run, dt_s)
+            if shown is not None:
+                hands[side] = shown
+        self._last = (plan.tick.run, plan.tick.index)
+        return hands
+
+    def hold(self, plan: Plan) -> dict[Side, ShownHand]:
+        """Both hands at the plan's tick when synthesis failed: the last good fingers stay."""
+        for hand in self.hands.values():
+            hand.recover()
+        return self.show(plan, {})
+
+    def _state(self, hand: Hand, wrist: BodyAtTick | None, thing: BodyAtTick | None) -> State:
+        if hand.resting:
+            hand.resting = not hand.at_rest()
+            return "rest"
+        ages = [np.inf if body is None else body.age_s for body in (wrist, thing)]
+        return state_at_age(max(ages))
+
+    def _scene(
+        self, side: Side, wrist: BodyAtTick, other: BodyAtTick | None, thing: BodyAtTick, prop: Prop
+    ) -> HandScene:
+        """The scene as the model's hand would see it: for a larger hand everything is smaller."""
+        shrink = np.append(np.full(3, 1.0 / self.config.hand_scale), np.ones(4))
+        other_window = None if other is None or other.age_s > HOLD_AFTER_S else other.window * shrink
+        return HandScene(
+            side,
+            wrist.window * shrink,
+            other_window,
+            thing.window * shrink,
+            prop.shape,
+            prop.scale / self.config.hand_scale,
+        )
+
+    def _elapsed_s(self, tick: Tick) -> float:
+        """Stream time since the last tick shown; across a restart of the sender, one tick."""
+        if self._last is None or self._last[0] != tick.run:
+            return TICK_S
+        return (tick.index - self._last[1]) * TICK_S
+
+
+def _parts(config: ActorConfig) -> dict[BodyKey, tuple[str, Array | None]]:
+    """What each body is to this actor: the part's name and where it sits on the body."""
+    parts = {alias: (wrist, body.offset) for wrist, body in config.wrists.items() for alias in _aliases(body.key)}
+    for thing in config.objects:
+        parts |= dict.fromkeys(_aliases(thing.body.key), (thing.name, thing.body.offset))
+    return parts
+
+
+def _aliases(key: BodyKey) -> tuple[BodyKey, ...]:
+    """A number is the same body whether it comes as an id or, from some bridges, as a name."""
+    if isinstance(key, int):
+        return key, str(key)
+    return (key, int(key)) if key.isdecimal() else (key,)
+
+
+def _pose(sample: BodySample, offset: Array | None) -> Array:
+    pose = np.array([*sample.p, *sample.q])
+    return pose if offset is None else compose(pose, offset)
+
+
+def _other(side: Side) -> Side:
+    return "right" if side == "left" else "left"

@@ -1,0 +1,56 @@
+"""The props of one actor, and which of them a hand is about."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from manipnet.geometry import Array, invert, mirror_points, transform
+from manipnet.objects.shape import Shape
+from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S
+from manipnet.synthesis import Side
+from manipnet.timeline import BodyAtTick
+
+PALM_M: Final = np.array([0.09, 0.0, -0.03])
+"""A little in front of the palm of a right hand, in its wrist frame: where what it takes will be."""
+HYSTERESIS_M: Final = 0.03
+"""Another prop must be this much nearer before a hand turns to it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prop:
+    """A tracked prop: `name` is its body's, `object` its shape's; `scale` resizes the shape about its origin."""
+
+    name: str
+    object: str
+    shape: Shape
+    scale: float = 1.0
+
+
+def choose_prop(
+    side: Side,
+    T_world_wrist: Array,
+    props: Sequence[Prop],
+    bodies: Mapping[str, BodyAtTick],
+    current: str | None,
+) -> Prop | None:
+    """The tracked prop nearest to the palm; the `current` one as long as it is not clearly farther.
+
+    A current prop whose tracking is lost is kept while it may come back. None when no prop was tracked lately.
+    """
+    held = next((prop for prop in props if prop.name == current and prop.name in bodies), None)
+    if held is not None and HOLD_AFTER_S < bodies[held.name].age_s <= REST_AFTER_S:
+        return held
+    tracked = [prop for prop in props if prop.name in bodies and bodies[prop.name].age_s <= HOLD_AFTER_S]
+    if len(tracked) < 2:
+        return tracked[0] if tracked else None
+    palm = transform(T_world_wrist, PALM_M if side == "right" else mirror_points(PALM_M))
+    distances = [palm_distance(palm, prop, bodies[prop.name].pose) - HYSTERESIS_M * (prop is held) for prop in tracked]
+    return tracked[int(np.argmin(distances))]
+
+
+def palm_distance(p_palm: Array, prop: Prop, T_world_object: Array) -> float:
+    """Signed distance of a world point to a prop's surface, metres."""
+    p_object = transform(invert(T_world_object), p_palm) / prop.scale
+    return float(prop.shape.signed_distance(p_object[None])[0][0]) * prop.scale

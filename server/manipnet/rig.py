@@ -1,0 +1,207 @@
+"""Rig files: which streamed body plays which part, in TOML. See `docs/rig.md`."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manipnet.config import SCALE_RANGE, WRISTS, ActorConfig, BodyConfig, ConfigError, ObjectConfig
+from manipnet.geometry import Array, quat_normalize
+from manipnet.objects.mesh import UNITS_M
+from manipnet.timeline import MAX_LOOK_AHEAD_S
+
+MAX_FILE_BYTES = 1_000_000
+
+SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
+    "host": (str,),
+    "port": (int,),
+    "input_port": (int,),
+    "control_port": (int,),
+    "osc_port": (int,),
+    "page_port": (int,),
+    "metrics_port": (int,),
+    "vmc": (str,),
+    "livelink": (str,),
+    "model": (str,),
+    "look_ahead": (int, float),
+}
+"""What the table `[server]` may hold: the command line's options of these names, which win over it."""
+
+_ACTOR_KEYS = ("bodies", "objects", "hand_scale")
+_OFFSET_KEYS = ("body", "position", "rotation")
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """A rig file's content."""
+
+    actors: tuple[ActorConfig, ...]
+    server: dict[str, Any] = field(default_factory=dict)
+
+
+def load_rig(path: Path) -> Rig:
+    """Read a rig file. Raises `ConfigError`, whose text starts with the file and, where it can, the line."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror})") from None
+    if len(content) > MAX_FILE_BYTES:
+        raise ConfigError(f"{path}: is {len(content)} bytes; a rig file has at most {MAX_FILE_BYTES}")
+    try:
+        text = content.decode("utf-8")
+        top = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(f"{path}: not TOML: {error}") from None
+    return _Reader(path, text).rig(top)
+
+
+class _Reader:
+    """Walks the parsed file; knows where in the text each key stands, for the errors."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self._path, self._lines = path, _key_lines(text)
+
+    def rig(self, top: dict[str, Any]) -> Rig:
+        several = "actors" in top
+        self._known(top, (), ("server", "actors") if several else ("server", *_ACTOR_KEYS))
+        if several:
+            tables = self._list_of_tables(top["actors"], ("actors",))
+            actors = tuple(self._actor(table, ("actors", i)) for i, table in enumerate(tables))
+        else:
+            actors = (self._actor({"name": "actor"} | top, ()),)
+        server = self._table(top.get("server", {}), ("server",))
+        self._known(server, ("server",), tuple(SERVER_KEYS))
+        for key, value in server.items():
+            at = ("server", key)
+            self._typed(value, SERVER_KEYS[key], at)
+            if key.endswith("port") and not 0 <= value < 65536:
+                self._fail(at, f"is {value}; allowed are 0 (any free one) … 65535")
+            if key == "look_ahead" and not 0.0 <= value <= MAX_LOOK_AHEAD_S:
+                self._fail(at, f"is {value}; allowed are 0 … {MAX_LOOK_AHEAD_S} s")
+        return Rig(actors, server)
+
+    def _actor(self, table: dict[str, Any], at: tuple) -> ActorConfig:
+        if at:
+            self._known(table, at, ("name", *_ACTOR_KEYS))
+        name = self._typed(table.get("name"), (str,), (*at, "name"))
+        bodies = self._table(table.get("bodies", {}), (*at, "bodies"))
+        self._known(bodies, (*at, "bodies"), WRISTS)
+        wrists = {wrist: self._body(value, (*at, "bodies", wrist)) for wrist, value in bodies.items()}
+        if not wrists:
+            self._fail((*at, "bodies"), f"is missing; it names the body of {' and of '.join(WRISTS)}")
+        tables = self._list_of_tables(table.get("objects", []), (*at, "objects"))
+        objects = tuple(self._object(entry, (*at, "objects", i)) for i, entry in enumerate(tables))
+        hand_scale = self._number(table.get("hand_scale", 1.0), (*at, "hand_scale"))
+        if not SCALE_RANGE[0] <= hand_scale <= SCALE_RANGE[1]:
+            self._fail((*at, "hand_scale"), f"is {hand_scale}; allowed are {SCALE_RANGE[0]} … {SCALE_RANGE[1]}")
+        return ActorConfig(name, wrists, objects, hand_scale)
+
+    def _object(self, table: dict[str, Any], at: tuple) -> ObjectConfig:
+        self._known(table, at, ("body", "mesh", "unit", "scale", "name", "position", "rotation"))
+        body = BodyConfig(self._key(table.get("body"), (*at, "body")), self._offset(table, at))
+        mesh = self._path.parent / self._typed(table.get("mesh"), (str,), (*at, "mesh"))
+        if not mesh.is_file():
+            self._fail((*at, "mesh"), f"is {table['mesh']!r}; there is no file {mesh}")
+        unit = table.get("unit", "m")
+        if unit not in UNITS_M:
+            self._fail((*at, "unit"), f"is {unit!r}; allowed are {', '.join(UNITS_M)}")
+        scale = self._number(table.get("scale", 1.0), (*at, "scale"))
+        name = self._typed(table.get("name", str(body.key)), (str,), (*at, "name"))
+        return ObjectConfig(name, body, mesh, unit, scale)
+
+    def _body(self, value: Any, at: tuple) -> BodyConfig:
+        if not isinstance(value, dict):
+            return BodyConfig(self._key(value, at))
+        self._known(value, at, _OFFSET_KEYS)
+        return BodyConfig(self._key(value.get("body"), (*at, "body")), self._offset(value, at))
+
+    def _key(self, value: Any, at: tuple) -> int | str:
+        key = self._typed(value, (int, str), at, "a streaming id (integer) or a name (text)")
+        return key if key != "" else self._fail(at, "is empty; it must be a streaming id or a name")
+
+    def _offset(self, table: dict[str, Any], at: tuple) -> Array | None:
+        if "position" not in table and "rotation" not in table:
+            return None
+        p = self._numbers(table.get("position", [0, 0, 0]), 3, (*at, "position"))
+        q = self._numbers(table.get("rotation", [0, 0, 0, 1]), 4, (*at, "rotation"))
+        if not np.linalg.norm(q) > 1e-6:
+            self._fail((*at, "rotation"), "is zero; it must be a quaternion x, y, z, w")
+        return np.concatenate([p, quat_normalize(q)])
+
+    def _numbers(self, value: Any, count: int, at: tuple) -> Array:
+        if not isinstance(value, list) or len(value) != count:
+            self._fail(at, f"is {_show(value)}; it must be {count} numbers")
+        return np.array([self._number(x, at) for x in value])
+
+    def _number(self, value: Any, at: tuple) -> float:
+        number = float(self._typed(value, (int, float), at, "a number"))
+        return number if abs(number) < 1e6 else self._fail(at, f"is {number}; it must be finite and below 1e6")
+
+    def _table(self, value: Any, at: tuple) -> dict[str, Any]:
+        return self._typed(value, (dict,), at, f"a table [{'.'.join(str(k) for k in at)}]")
+
+    def _list_of_tables(self, value: Any, at: tuple) -> list[dict[str, Any]]:
+        good = isinstance(value, list) and all(isinstance(entry, dict) for entry in value)
+        return value if good else self._fail(at, f"must be tables [[{at[-1]}]], not {_show(value)}")
+
+    def _typed(self, value: Any, kinds: tuple[type, ...], at: tuple, allowed: str = "") -> Any:
+        allowed = allowed or " or ".join({str: "text", int: "an integer", float: "a number"}[kind] for kind in kinds)
+        if value is None:
+            self._fail(at, f"is missing; it must be {allowed}")
+        if not isinstance(value, kinds) or isinstance(value, bool):
+            self._fail(at, f"is {_show(value)}; it must be {allowed}")
+        return value
+
+    def _known(self, table: dict[str, Any], at: tuple, allowed: tuple[str, ...]) -> None:
+        for key in table:
+            if key not in allowed:
+                self._fail((*at, key), f"is not known here; allowed are {', '.join(allowed)}")
+
+    def _fail(self, at: tuple, text: str) -> Any:
+        line = next((self._lines[at[:n]] for n in range(len(at), 0, -1) if at[:n] in self._lines), None)
+        dotted = "".join(f"[{key + 1}]" if isinstance(key, int) else f".{key}" for key in at).lstrip(".")
+        where = f"{self._path}:{line}" if line else f"{self._path}"
+        raise ConfigError(f"{where}: {dotted} {text}")
+
+
+def _show(value: Any) -> str:
+    return repr(value) if len(repr(value)) <= 60 else f"{type(value).__name__} of {len(repr(value))} characters"
+
+
+_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]#]+?)\s*\]\]?\s*(#.*)?$")
+_ASSIGNMENT = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
+
+
+def _key_lines(text: str) -> dict[tuple, int]:
+    """Line of each table and key of a TOML text, by path; list entries by index. Good enough for messages."""
+    lines: dict[tuple, int] = {}
+    counts: dict[tuple, int] = {}
+    table: tuple = ()
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := _HEADER.match(line):
+            table = _resolve(_split(header[2]), counts)
+            if header[1] == "[[":
+                counts[table] = counts.get(table, -1) + 1
+                table = (*table, counts[table])
+            lines.setdefault(table, number)
+        elif assignment := _ASSIGNMENT.match(line):
+            lines.setdefault((*table, *_split(assignment[1])), number)
+    return lines
+
+
+def _split(dotted: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+
+
+def _resolve(path: tuple, counts: dict[tuple, int]) -> tuple:
+    """The path with the current index after every list of tables on the way, but for the last."""
+    resolved: tuple = ()
+    for i, key in enumerate(path):
+        resolved = (*resolved, key)
+        if i < len(path) - 1 and resolved in counts:
+            resolved = (*resolved, counts[resolved])
+    return resolved
