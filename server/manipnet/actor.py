@@ -90,8 +90,7 @@ class Actor:
         self.timeline = Timeline(look_ahead_s)
         self.props = list(props)
         self.seq = 0
-        sides: list[Side] = [side for side in SIDES if f"{side}_wrist" in config.wrists]
-        self.hands: dict[Side, Hand] = {side: Hand(side, bundle, counters) for side in sides}
+        self.hands: dict[Side, Hand] = {
             side: Hand(side, bundle, counters) for side in SIDES if f"{side}_wrist" in config.wrists
         }
         self._parts = _parts(config)
