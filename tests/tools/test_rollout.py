@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from manipnet import geometry
-from manipnet_tools.rollout import tick_take
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.network.bundle import load_bundle
+from manipnet.objects.mesh import closed_mesh
+from manipnet.objects.shape import build_shape
+from manipnet.synthesis import Synthesizer
+from manipnet_tools.rollout import hand_inputs, roll_out, tick_take
 from manipnet_tools.takes import BodyTrack, Take
 
 NAMES = ("left_wrist", "right_wrist", "box")
@@ -63,3 +68,57 @@ def test_slices_keep_all_columns_together():
     part = ticks[5:9]
     np.testing.assert_array_equal(part.time_s, ticks.time_s[5:9])
     np.testing.assert_array_equal(part.bodies["box"].poses, ticks.bodies["box"].poses[5:9])
+
+
+def cube(size: float = 0.06):
+    corners = (np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]) - 0.5) * size
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return build_shape(
+        closed_mesh(corners, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]), "cube")
+    )
+
+
+def still_take(**positions: tuple[float, float, float]) -> Take:
+    """Bodies that stand still at the given places."""
+    time = np.arange(180) / 60.0
+    seen = np.ones(len(time), dtype=np.bool_)
+    bodies = {name: BodyTrack(np.tile([*p, 0.0, 0.0, 0.0, 1.0], (len(time), 1)), seen) for name, p in positions.items()}
+    return Take("still", 60.0, time, bodies)
+
+
+def test_each_hand_deals_with_the_nearest_object():
+    take = still_take(left_wrist=(-0.3, 1, 0), right_wrist=(0.3, 1, 0), one=(-0.42, 1, -0.1), two=(0.4, 1, -0.1))
+    shapes = {"one": cube(), "two": cube(0.05)}
+    inputs = hand_inputs(tick_take(take), shapes)
+    for side, name in (("left", "one"), ("right", "two")):
+        scene = inputs[side].scene(7)
+        assert scene.shape is shapes[name]
+        np.testing.assert_allclose(scene.object[3], take.bodies[name].poses[0])
+
+
+def test_a_hand_turns_to_the_object_that_comes_nearer():
+    take = still_take(left_wrist=(-0.3, 1, 0), right_wrist=(0.3, 1, 0), one=(0.42, 1, -0.1), two=(0.6, 1, -0.1))
+    seconds = take.time_s[:, None]
+    arriving = take.bodies["two"].poses - np.clip(seconds - 1.5, 0.0, 0.2) * np.eye(7)[0]
+    leaving = take.bodies["one"].poses - np.clip(seconds - 1.5, 0.0, 0.2) * np.eye(7)[0]
+    seen = take.bodies["one"].tracked
+    bodies = take.bodies | {"one": BodyTrack(leaving, seen), "two": BodyTrack(arriving, seen)}
+    held = hand_inputs(tick_take(replace(take, bodies=bodies)), {"one": cube(), "two": cube()})["right"].held
+    assert (held[0], held[-1]) == (0, 1)
+    assert np.count_nonzero(np.diff(held)) == 1
+
+
+def test_hands_of_different_lengths_are_rolled_out_together(still_model):
+    bundle = load_bundle(still_model)
+    take = still_take(left_wrist=(-0.3, 1, 0), right_wrist=(0.3, 1, 0), box=(0.4, 1, 0))
+    inputs = hand_inputs(tick_take(take), {"box": cube()})
+    hands = [inputs["left"][:3], inputs["right"]]
+    heard: list[int] = []
+    motions = roll_out(Synthesizer(bundle, "none"), hands, heard.append)
+    assert [len(motion.positions) for motion in motions] == [3, len(inputs["right"])]
+    assert sum(heard) == 3 + len(inputs["right"])
+    for motion in motions:
+        positions, _ = forward_kinematics(motion.angles)
+        np.testing.assert_allclose(motion.positions, positions)
+        np.testing.assert_allclose(motion.raw_positions, positions)
+        np.testing.assert_allclose(motion.distances, 0.035)

@@ -62,5 +62,5 @@ class Retrieval:
         positions, rotations = (
             np.repeat(pose[None], count, axis=0) for pose in (self._hand.positions, self._hand.rotations)
         )
-        rows = features(seen.shape, windows, positions, rotations)
+        rows = features(seen.shapes[0], windows, positions, rotations)
         return np.concatenate([rows[:, block] for block in _BLOCKS], axis=1)

@@ -109,7 +109,7 @@ def load_case(take: Take, meshes: Path) -> Case:
         take.objects[0],
         shape,
         ticks,
-        hand_inputs(ticks, dict.fromkeys(SIDES, take.objects[0]), {take.objects[0]: shape}),
+        hand_inputs(ticks, {take.objects[0]: shape}),
         {side: _in_wrist(side, p, ticks.bodies[f"{side}_wrist"].poses) for side, p in world.items()},
         {side: metrics.capsule_gaps(p, T_world_object, shape) for side, p in world.items()},
         physics.wrench_needed(T_world_object, body),

@@ -7,14 +7,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet.objects.shape import Shape
+from manipnet.props import Prop, choose_prop
 from manipnet.synthesis import HandScene, HandStep, Side, Synthesizer
-from manipnet.timeline import MAX_LOOK_AHEAD_S, Tick, Timeline
+from manipnet.timeline import MAX_LOOK_AHEAD_S, BodyAtTick, Tick, Timeline
 from manipnet_tools.takes import Take
 
 SIDES: tuple[Side, ...] = ("left", "right")
+OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
 @dataclass(frozen=True)
@@ -25,9 +28,15 @@ class BodyTicks:
     """`(n, 21, 7)` poses about the instant each tick is computed from."""
     poses: Array
     """`(n, 7)` at the tick itself."""
+    ages_s: Array
+    """`(n,)` since it was last tracked."""
 
     def __getitem__(self, ticks: slice) -> "BodyTicks":
-        return BodyTicks(self.windows[ticks], self.poses[ticks])
+        return BodyTicks(self.windows[ticks], self.poses[ticks], self.ages_s[ticks])
+
+    def at(self, tick: int) -> BodyAtTick:
+        """The body at one tick."""
+        return BodyAtTick(self.windows[tick], self.poses[tick], float(self.ages_s[tick]))
 
 
 @dataclass(frozen=True)
@@ -43,24 +52,35 @@ class Ticks:
 
 @dataclass(frozen=True)
 class HandInput:
-    """All that the synthesis of one hand gets: windows `(n, 21, 7)` in the world, the object, its scale."""
+    """All that the synthesis of one hand gets at `n` ticks: windows `(n, 21, 7)` in the world, shapes and a scale.
+
+    `held (n,)` says which of the `shapes` the hand deals with; `object` are that one's windows.
+    """
 
     side: Side
     wrist: Array
     other_wrist: Array
     object: Array
-    shape: Shape
+    shapes: tuple[Shape, ...]
+    held: NDArray[np.int64]
     scale: float = 1.0
 
     def __len__(self) -> int:
         return len(self.wrist)
 
     def __getitem__(self, ticks: slice) -> "HandInput":
-        return replace(self, wrist=self.wrist[ticks], other_wrist=self.other_wrist[ticks], object=self.object[ticks])
+        return replace(
+            self,
+            wrist=self.wrist[ticks],
+            other_wrist=self.other_wrist[ticks],
+            object=self.object[ticks],
+            held=self.held[ticks],
+        )
 
     def scene(self, tick: int) -> HandScene:
         """What the synthesis sees at one tick."""
-        return HandScene(self.side, self.wrist[tick], self.other_wrist[tick], self.object[tick], self.shape, self.scale)
+        shape = self.shapes[self.held[tick]]
+        return HandScene(self.side, self.wrist[tick], self.other_wrist[tick], self.object[tick], shape, self.scale)
 
 
 @dataclass(frozen=True)
@@ -94,20 +114,33 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
             name: BodyTicks(
                 np.stack([t.bodies[name].window for t in whole]),
                 np.stack([t.bodies[name].pose for t in whole]),
+                np.array([t.bodies[name].age_s for t in whole]),
             )
             for name in names
         },
     )
 
 
-def hand_inputs(ticks: Ticks, objects: dict[Side, str], shapes: dict[str, Shape]) -> dict[Side, HandInput]:
-    """Inputs of both hands: `objects` says which body each side handles, `shapes` what each body is."""
-    wrists = {side: ticks.bodies[f"{side}_wrist"].windows for side in SIDES}
-    other = {"left": "right", "right": "left"}
-    return {
-        side: HandInput(side, wrists[side], wrists[other[side]], ticks.bodies[body].windows, shapes[body])
-        for side, body in objects.items()
-    }
+def hand_inputs(ticks: Ticks, shapes: dict[str, Shape]) -> dict[Side, HandInput]:
+    """Inputs of both hands, each dealing with one of the bodies in `shapes` at a time."""
+    windows = np.stack([ticks.bodies[name].windows for name in shapes])
+    inputs = {}
+    for side in SIDES:
+        wrist, other = (ticks.bodies[f"{name}_wrist"].windows for name in (side, OTHER[side]))
+        held = _held(ticks, side, shapes)
+        object_windows = windows[held, np.arange(len(held))]
+        inputs[side] = HandInput(side, wrist, other, object_windows, tuple(shapes.values()), held)
+    return inputs
+
+
+def _held(ticks: Ticks, side: Side, shapes: dict[str, Shape]) -> NDArray[np.int64]:
+    """Index into `shapes` of what each tick's hand deals with, `(n,)`, chosen as the server chooses."""
+    props = [Prop(name, name, shape) for name, shape in shapes.items()]
+    wrists, held, prop = ticks.bodies[f"{side}_wrist"].poses, [], props[0]
+    for k, wrist in enumerate(wrists):
+        prop = choose_prop(side, wrist, props, {p.name: ticks.bodies[p.name].at(k) for p in props}, prop.name) or prop
+        held.append(props.index(prop))
+    return np.array(held)
 
 
 def roll_out(

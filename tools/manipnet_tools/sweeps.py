@@ -20,7 +20,7 @@ from manipnet.synthesis import Side, SolverName, Synthesizer
 from manipnet_tools import baselines, metrics, physics
 from manipnet_tools.cases import SEEN_SHARE, Case, data_folders, load_case
 from manipnet_tools.evaluate import synthesise
-from manipnet_tools.rollout import SIDES, HandInput, hand_inputs, roll_out, tick_take
+from manipnet_tools.rollout import HandInput, hand_inputs, roll_out, tick_take
 from manipnet_tools.scoring import Score, average, score
 from manipnet_tools.takes import BodyTrack, Take, read_take
 
@@ -90,7 +90,7 @@ def look_ahead(seconds: float) -> Change:
 
 def _inputs(take: Take, case: Case, look_ahead_s: float = 0.5) -> dict[Side, HandInput]:
     ticks = tick_take(take, look_ahead_s)[: len(case)]
-    return hand_inputs(ticks, dict.fromkeys(SIDES, case.object), {case.object: case.shape})
+    return hand_inputs(ticks, {case.object: case.shape})
 
 
 def resolution(triangles: int) -> Change:
@@ -98,7 +98,7 @@ def resolution(triangles: int) -> Change:
 
     def change(take: Take, case: Case) -> Case:
         shape = remeshed(case.shape, triangles)
-        return replace(case, inputs={side: replace(seen, shape=shape) for side, seen in case.inputs.items()})
+        return replace(case, inputs={side: replace(seen, shapes=(shape,)) for side, seen in case.inputs.items()})
 
     return change
 

@@ -1,0 +1,52 @@
+"""A model without training, for what is not about the model."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
+from manipnet.network.bundle import FORMAT
+from manipnet.network.features import pose_outputs
+from manipnet.network.layout import INPUT_SIZE, OUTPUT_SIZE, describe
+
+STILL_ANGLES = np.clip(np.full(20, 0.2), DOF_LIMITS_RAD[:, 0], DOF_LIMITS_RAD[:, 1])
+
+
+@pytest.fixture(scope="session")
+def still_model(tmp_path_factory) -> Path:
+    """A bundle whose network answers `STILL_ANGLES`, far from any surface, whatever it is shown."""
+    onnx = pytest.importorskip("onnx", reason="the extra `train` makes test models")
+    positions, rotations = forward_kinematics(STILL_ANGLES[None])
+    answer = pose_outputs(positions, rotations, np.full((1, 22), 1.0))[0]
+    helper, kind = onnx.helper, onnx.TensorProto.FLOAT
+    graph = helper.make_graph(
+        [
+            helper.make_node("MatMul", ["features", "nothing"], ["zero"]),
+            helper.make_node("Add", ["zero", "answer"], ["pose"]),
+        ],
+        "still",
+        [helper.make_tensor_value_info("features", kind, ["n", INPUT_SIZE])],
+        [helper.make_tensor_value_info("pose", kind, ["n", OUTPUT_SIZE])],
+        [
+            onnx.numpy_helper.from_array(np.zeros((INPUT_SIZE, OUTPUT_SIZE), np.float32), "nothing"),
+            onnx.numpy_helper.from_array(answer.astype(np.float32), "answer"),
+        ],
+    )
+    opset = [helper.make_opsetid("", 17)]
+    content = helper.make_model(graph, opset_imports=opset, ir_version=9).SerializeToString()
+    folder = tmp_path_factory.mktemp("still")
+    (folder / "manipnet.onnx").write_bytes(content)
+    meta = {
+        "format": FORMAT,
+        "layout": describe(),
+        "dofs": list(DOF_NAMES),
+        "rest_angles_rad": [0.0] * 20,
+        "limits_rad": DOF_LIMITS_RAD.tolist(),
+        "model_sha256": hashlib.sha256(content).hexdigest(),
+    }
+    (folder / "bundle.json").write_text(json.dumps(meta))
+    return folder

@@ -1,0 +1,81 @@
+"""`manipnet synthesize`: fingers for a take, offline, by the synthesis of the live server."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.progress import Progress
+
+from manipnet.geometry import Array
+from manipnet.network.bundle import DEFAULT_MODEL, load_bundle
+from manipnet.objects.shape import Shape, load_shape
+from manipnet.synthesis import Synthesizer, hand_to_world
+from manipnet.timeline import MAX_LOOK_AHEAD_S
+from manipnet_tools.rollout import Ticks, hand_inputs, roll_out, tick_take
+from manipnet_tools.takes import Take, TakeError, read_take
+
+
+@dataclass(frozen=True)
+class SynthesizeOptions:
+    """Write the fingers of both hands of a take to a file, in world coordinates at 60 Hz."""
+
+    take: tyro.conf.Positional[Path]
+    """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
+    mesh: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=FILE")]
+    """Objects of the take that are handled, each with its mesh in metres."""
+    out: Path
+    """The file to write, .npz."""
+    model: str = DEFAULT_MODEL
+    """A shipped bundle's name or a bundle folder."""
+    look_ahead: float = MAX_LOOK_AHEAD_S
+    """Seconds of the future the synthesis knows, 0 to 0.5; the rest it forecasts."""
+
+
+def run(options: SynthesizeOptions) -> None:
+    """Synthesise and write. Raises `TakeError`, `MeshError` and `BundleError`."""
+    if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
+        raise TakeError(f"look-ahead {options.look_ahead} s is outside 0 to {MAX_LOOK_AHEAD_S}")
+    take = read_take(options.take)
+    shapes = read_shapes(options.mesh, take)
+    synthesizer = Synthesizer(load_bundle(options.model))
+    ticks = tick_take(take, options.look_ahead)
+    console = Console(stderr=True)
+    with Progress(console=console) as progress:
+        task = progress.add_task(take.name, total=2 * len(ticks.time_s))
+        hands: dict[str, Any] = synthesise(synthesizer, ticks, shapes, lambda n: progress.advance(task, n))
+    with options.out.open("wb") as file:
+        np.savez_compressed(file, time=ticks.time_s, **hands)
+    console.print(f"wrote {options.out}: {len(ticks.time_s)} frames at 60 Hz, both hands")
+
+
+def read_shapes(meshes: tuple[str, ...], take: Take) -> dict[str, Shape]:
+    """Shapes by body from `NAME=FILE`. Raises `TakeError` for a body the take does not have, and `MeshError`."""
+    shapes = {}
+    for text in meshes:
+        name, equals, path = text.partition("=")
+        if not equals or name not in take.objects:
+            raise TakeError(f"--mesh {text}: must be NAME=FILE with NAME one of {', '.join(take.objects) or 'none'}")
+        shapes[name] = load_shape(path)
+    if not shapes:
+        raise TakeError(f"no --mesh: at least one of {', '.join(take.objects) or 'none'} needs one")
+    return shapes
+
+
+def synthesise(
+    synthesizer: Synthesizer, ticks: Ticks, shapes: dict[str, Shape], advance: Callable[[int], None]
+) -> dict[str, Array]:
+    """The arrays of the file: world positions, rotations, distances and positions before inverse kinematics."""
+    inputs = hand_inputs(ticks, shapes)
+    arrays: dict[str, Array] = {}
+    for side, motion in zip(inputs, roll_out(synthesizer, list(inputs.values()), advance), strict=True):
+        wrist = ticks.bodies[f"{side}_wrist"].poses
+        arrays[f"{side}_positions"], arrays[f"{side}_rotations"] = hand_to_world(
+            side, wrist, motion.positions, motion.rotations
+        )
+        arrays[f"{side}_distances"] = motion.distances
+        arrays[f"{side}_raw_positions"], _ = hand_to_world(side, wrist, motion.raw_positions, motion.rotations)
+    return arrays
