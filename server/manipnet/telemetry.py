@@ -91,6 +91,7 @@ class Timings:
     def __init__(self, window: int = 960) -> None:
         self._lock = threading.Lock()
         self._all = {stage: HdrHistogram(1, 60_000_000, 3) for stage in STAGES}
+        self._sums_s: dict[str, float] = dict.fromkeys(STAGES, 0.0)
         self._recent = {stage: deque[float](maxlen=window) for stage in STAGES}
 
     def record(self, stage: str, seconds: float) -> None:
@@ -98,6 +99,7 @@ class Timings:
         with self._lock:
             self._all[stage].record_value(min(max(int(seconds * 1e6), 1), 60_000_000))
             self._recent[stage].append(seconds)
+            self._sums_s[stage] += seconds
 
     def recent(self, stage: str, *percentiles: float) -> list[float]:
         """Percentiles of the newest durations in seconds, emptied by reading; zeros when there are none."""
@@ -111,10 +113,10 @@ class Timings:
         with self._lock:
             return [self._all[stage].get_value_at_percentile(p) * 1e-6 for p in percentiles]
 
-    def count(self, stage: str) -> int:
-        """How many durations were recorded since the start."""
+    def totals(self, stage: str) -> tuple[int, float]:
+        """How many durations were recorded since the start, and their sum in seconds."""
         with self._lock:
-            return int(self._all[stage].get_total_count())
+            return int(self._all[stage].get_total_count()), self._sums_s[stage]
 
 
 class RateLimit(logging.Filter):

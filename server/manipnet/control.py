@@ -1,0 +1,141 @@
+"""Requests from clients: a REP socket on a thread of its own, answering in the encoding of the question."""
+
+import json
+import logging
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import msgpack
+import zmq
+
+from manipnet.publisher import bind
+from manipnet.streams.zmq_bodies import zmq_endpoint
+from manipnet.telemetry import CONTROL_OPS, Counters
+
+MAX_REQUEST_BYTES: Final = 4096
+_OPS: Final = tuple(op for op in CONTROL_OPS if op != "invalid")
+_log = logging.getLogger(__name__)
+
+Request = Mapping[str, Any]
+Handler = Callable[[Request], dict[str, Any]]
+
+
+class RequestError(ValueError):
+    """A request that cannot be met; the text says what was wrong and what is allowed."""
+
+
+class Control:
+    """Answers requests on `tcp://host:port` with `handlers`, one per operation, each called on this thread."""
+
+    def __init__(self, host: str, port: int, handlers: Mapping[str, Handler], counters: Counters) -> None:
+        """Binds; raises `ListenError`. `start` begins to answer."""
+        self._handlers, self._counters = handlers, counters
+        endpoint, ipv6 = zmq_endpoint(host, port)
+        self._context = zmq.Context()
+        rep = self._context.socket(zmq.REP)
+        rep.setsockopt(zmq.LINGER, 0)
+        rep.setsockopt(zmq.MAXMSGSIZE, MAX_REQUEST_BYTES)
+        rep.setsockopt(zmq.SNDHWM, 16)
+        rep.setsockopt(zmq.RCVHWM, 16)
+        rep.setsockopt(zmq.HEARTBEAT_IVL, 1_000)
+        rep.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
+        rep.setsockopt(zmq.IPV6, int(ipv6))
+        try:
+            bind(rep, endpoint, "--control-port")
+        except BaseException:
+            self._context.term()
+            raise
+        self.address = rep.getsockopt_string(zmq.LAST_ENDPOINT)
+        self._socket = rep
+        self._thread = threading.Thread(target=self._run, name="control", daemon=True)
+
+    def start(self) -> None:
+        """Begin to answer."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop answering and free the port."""
+        if not self._thread.is_alive():
+            self._socket.close()
+        self._context.term()  # wakes the thread, and waits until it closed its socket
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        with self._socket as rep:
+            while True:
+                try:
+                    parts = rep.recv_multipart()
+                    rep.send(self.answer(parts))
+                except zmq.ContextTerminated:
+                    return
+                except zmq.ZMQError as error:
+                    _log.warning("control: an answer was lost: %s", error)
+
+    def answer(self, parts: list[bytes]) -> bytes:
+        """The answer to one request, whatever it is."""
+        as_json = bool(parts) and parts[0].lstrip()[:1] in (b"{", b"[")
+        op = "invalid"
+        try:
+            request = _decode(parts)
+            op = _operation(request)
+            reply = self._handlers[op](request)
+        except RequestError as error:
+            reply = {"error": str(error)}
+        except Exception as error:
+            _log.exception("control: %s failed", op)
+            reply = {"error": f"{op} failed inside the server: {type(error).__name__}: {error}"}
+        self._counters.add("control_requests", op=op)
+        return json.dumps(reply).encode() if as_json else msgpack.packb(reply) or b""
+
+
+def number(request: Request, key: str, low: float, high: float, default: float | None = None) -> float:
+    """A number of the request within `low` … `high`; raises `RequestError`."""
+    value = request.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise RequestError(f"{key} is {_show(value)}; it must be a number in {low} … {high}")
+    if not low <= value <= high:
+        raise RequestError(f"{key} is {value}; allowed are {low} … {high}")
+    return float(value)
+
+
+def choice(request: Request, key: str, allowed: tuple, default: Any = None) -> Any:
+    """One of the `allowed` values; raises `RequestError`, which lists them."""
+    value = request.get(key, default)
+    if isinstance(value, bool) or value not in allowed:
+        raise RequestError(f"{key} is {_show(value)}; allowed are {', '.join(map(str, allowed))}")
+    return value
+
+
+def ping(_: Request) -> dict[str, Any]:
+    """The server's monotonic clock, seconds."""
+    return {"t": time.monotonic()}
+
+
+def _decode(parts: list[bytes]) -> Request:
+    if len(parts) != 1:
+        raise RequestError(f"the request has {len(parts)} frames; send one, a msgpack or JSON map")
+    try:
+        text = parts[0].lstrip()
+        request = json.loads(text) if text[:1] in (b"{", b"[") else msgpack.unpackb(parts[0])
+    except Exception as error:  # both decoders have a dozen ways to refuse
+        reason = str(error)[:80] or type(error).__name__
+        raise RequestError(f"the request is neither a msgpack nor a JSON map: {reason}") from None
+    if not isinstance(request, dict):
+        raise RequestError(f"the request is {type(request).__name__}; it must be a map with the key op")
+    return request
+
+
+def _operation(request: Request) -> str:
+    op = request.get("op")
+    if not isinstance(op, str) or op not in _OPS:
+        raise RequestError(f"op is {_show(op)}; allowed are {', '.join(_OPS)}")
+    return op
+
+
+def _show(value: Any) -> str:
+    text = "missing" if value is None else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}…"

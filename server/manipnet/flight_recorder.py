@@ -1,0 +1,58 @@
+"""The last moments before an internal error, in a file: what came in, what was about to be computed."""
+
+import json
+import logging
+import time
+import traceback
+from collections import deque
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Final
+
+from manipnet.streams.bodies import BodyFrame
+from manipnet.timeline import Tick
+
+KEEP_FRAMES: Final = 360
+"""One to three seconds of input."""
+EVERY_S: Final = 60.0
+MAX_DUMPS: Final = 10
+"""Dumps of one session: an error that repeats 60 times a second must not fill the disk."""
+
+_log = logging.getLogger(__name__)
+
+
+class FlightRecorder:
+    """Keeps the newest frames and writes them out when asked. Belongs to the tick thread."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._frames = deque[BodyFrame](maxlen=KEEP_FRAMES)
+        self._last_s, self._count = float("-inf"), 0
+
+    def note(self, frame: BodyFrame) -> None:
+        """Remember a frame."""
+        self._frames.append(frame)
+
+    def dump(self, error: BaseException, ticks: list[Tick], now_s: float) -> Path | None:
+        """Write frames, ticks and the error as JSON; None when it was done moments ago or cannot be done."""
+        if now_s - self._last_s < EVERY_S or self._count >= MAX_DUMPS:
+            return None
+        self._last_s, self._count = now_s, self._count + 1
+        path = self._folder / f"manipnet-{time.strftime('%Y%m%d-%H%M%S')}-{self._count}.json"
+        content = {
+            "error": traceback.format_exception(error),
+            "ticks": [_tick(tick) for tick in ticks],
+            "frames": [asdict(frame) for frame in self._frames],
+        }
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(content), encoding="utf-8")
+        except OSError as problem:
+            _log.error("the frames before an error cannot be written to %s: %s", self._folder, problem)
+            return None
+        return path
+
+
+def _tick(tick: Tick) -> dict[str, Any]:
+    bodies = {name: {"pose": body.pose.tolist(), "age_s": body.age_s} for name, body in tick.bodies.items()}
+    return {"run": tick.run, "index": tick.index, "time_s": tick.time_s, "silent": tick.silent, "bodies": bodies}

@@ -1,0 +1,120 @@
+"""Hands out, to every client and receiver that was asked for. Belongs to the tick thread; nothing here waits."""
+
+import logging
+import socket
+
+import zmq
+
+from manipnet.config import ConfigError, ServerConfig
+from manipnet.streams.intake import ListenError
+from manipnet.streams.livelink_json import LiveLinkJsonSender
+from manipnet.streams.vmc import VmcSender
+from manipnet.streams.websocket import WebSocketPublisher
+from manipnet.streams.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, encode_binary, encode_msgpack
+from manipnet.streams.zmq_bodies import zmq_endpoint
+from manipnet.telemetry import Counters
+
+SEND_HIGH_WATER_MARK = 64
+"""Messages kept for a client that does not read, about half a second; then it loses the newest, the others nothing."""
+
+_log = logging.getLogger(__name__)
+
+
+class Publisher:
+    """The outputs of one server: ZeroMQ and WebSocket always, VMC and Live Link where configured."""
+
+    def __init__(self, config: ServerConfig, counters: Counters) -> None:
+        """Binds all sockets; raises `ListenError` or `ConfigError`, and then holds none."""
+        self._counters = counters
+        self._context = zmq.Context()
+        self._pub: zmq.Socket | None = None
+        self._web: WebSocketPublisher | None = None
+        self._senders: list[tuple[str, VmcSender | LiveLinkJsonSender]] = []
+        try:
+            self._pub = self._bind_pub(config.host, config.port)
+            self._web = _bind_web(config.host, config.page_port)
+            if config.vmc is not None:
+                self._senders.append(("vmc", VmcSender(*_resolve("--vmc", config.vmc))))
+            if config.livelink is not None:
+                self._senders.append(("livelink", LiveLinkJsonSender(*_resolve("--livelink", config.livelink))))
+        except BaseException:
+            self.close()
+            raise
+        self.addresses = {
+            "hands": self._pub.getsockopt_string(zmq.LAST_ENDPOINT),
+            "page": self._web.address,
+        }
+        """What it listens on, by what it carries."""
+
+    def publish(self, message: HandsMessage) -> None:
+        """Send one message to everybody; raises `MessageError` for one that must not leave."""
+        assert self._pub is not None
+        assert self._web is not None
+        binary = encode_binary(message)
+        self._pub.send(TOPIC_MSGPACK + encode_msgpack(message))
+        self._pub.send(TOPIC_BIN + binary)
+        self._counters.add("messages_out", topic="msgpack")
+        self._counters.add("messages_out", topic="bin")
+        if self._web.client_count:
+            self._web.publish(binary)
+            self._counters.add("messages_out", topic="page")
+        for topic, sender in self._senders:
+            try:
+                sender.send(message)
+                self._counters.add("messages_out", topic=topic)
+            except OSError as error:
+                _log.warning("%s cannot be sent: %s", topic, error)
+
+    def close(self) -> None:
+        """Close every socket; harmless when called twice."""
+        for _, sender in self._senders:
+            sender.close()
+        self._senders.clear()
+        if self._web is not None:
+            self._web.stop()
+        if self._pub is not None:
+            self._pub.close()
+        self._context.term()
+
+    def _bind_pub(self, host: str, port: int) -> zmq.Socket:
+        endpoint, ipv6 = zmq_endpoint(host, port)
+        pub = self._context.socket(zmq.PUB)
+        pub.setsockopt(zmq.LINGER, 0)
+        pub.setsockopt(zmq.SNDHWM, SEND_HIGH_WATER_MARK)
+        pub.setsockopt(zmq.HEARTBEAT_IVL, 1_000)
+        pub.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
+        pub.setsockopt(zmq.MAXMSGSIZE, 256)  # subscriptions are all that comes in
+        pub.setsockopt(zmq.IPV6, int(ipv6))
+        bind(pub, endpoint, "--port")
+        return pub
+
+
+def bind(sock: zmq.Socket, endpoint: str, option: str) -> None:
+    """Bind, or close the socket and raise `ListenError` naming the endpoint and the option that moves it."""
+    try:
+        sock.bind(endpoint)
+    except zmq.ZMQError as error:
+        sock.close()
+        raise ListenError(
+            f"{option}: cannot listen on {endpoint}: {zmq.strerror(error.errno or 0)}; "
+            f"is another server running? {option} 0 takes any free port"
+        ) from None
+
+
+def _bind_web(host: str, port: int) -> WebSocketPublisher:
+    try:
+        return WebSocketPublisher(host, port)
+    except OSError as error:
+        raise ListenError(
+            f"--page-port: cannot listen on {host}:{port}: {error.strerror or error}; "
+            "is another program using it? --page-port 0 takes any free port"
+        ) from None
+
+
+def _resolve(option: str, endpoint: tuple[str, int]) -> tuple[str, int]:
+    """The numeric address, looked up once: a name server must not be asked 60 times a second."""
+    try:
+        found = socket.getaddrinfo(*endpoint, family=socket.AF_INET, type=socket.SOCK_DGRAM)
+        return str(found[0][4][0]), endpoint[1]
+    except OSError as error:
+        raise ConfigError(f"{option}: {endpoint[0]!r} is no address or known name ({error.strerror})") from None
