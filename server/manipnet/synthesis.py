@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
 from manipnet.geometry import (
     Array,
@@ -25,6 +24,7 @@ from manipnet.ik.ccd import solve_ccd
 from manipnet.ik.chains import clamp
 from manipnet.ik.least_squares import solve_least_squares
 from manipnet.ik.targets import place_targets
+from manipnet.kernels import njit
 from manipnet.network.bundle import Bundle
 from manipnet.network.features import Windows, features
 from manipnet.network.layout import OUTPUT, OUTPUT_DISTANCE_MAX_M, PRESENT

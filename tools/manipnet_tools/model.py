@@ -1,6 +1,7 @@
 """ManipNet as a torch module (paper, section 6.2), with its normalisation inside, and its export to ONNX."""
 
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,7 +9,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from manipnet.network.layout import ENCODED, INPUT, INPUT_SIZE, OUTPUT, OUTPUT_SIZE
+from manipnet.network.layout import ENCODED, INPUT, INPUT_SIZE, OUTPUT, OUTPUT_SIZE, PRESENT
 
 Architecture = Literal["manipnet", "resnet", "mlp"]
 
@@ -67,7 +68,30 @@ def _floors(layout, floors, size) -> np.ndarray:
     return columns
 
 
+_FUTURE = {
+    **dict.fromkeys(
+        ("wrist_positions", "wrist_axes", "other_wrist_distances", "object_centers", "object_angular_velocities"),
+        PRESENT + 3,
+    ),
+    "proximity": 2,
+    "signed_distances": 2,
+}
+"""First row of each block that lies more than 0.1 s ahead."""
 _POSE = ENCODED["pose"]
+_ENCODED_SIZES = [columns.stop - columns.start for columns in ENCODED.values()]
+
+
+def hidden_columns(names: Sequence[str]) -> np.ndarray:
+    """Which of the 2356 inputs are meant by block names, or by `future` (what lies more than 0.1 s ahead)."""
+    mask = np.zeros(INPUT_SIZE, dtype=np.bool_)
+    for name in names:
+        if name == "future":
+            for block, first in _FUTURE.items():
+                rows = np.arange(INPUT_SIZE)[INPUT[block].columns].reshape(INPUT[block].shape)
+                mask[rows[first:].ravel()] = True
+        else:
+            mask[INPUT[name].columns] = True
+    return mask
 
 
 class ResidualDenseBlock(nn.Module):
@@ -98,8 +122,11 @@ class ManipNet(nn.Module):
         architecture: Architecture = "manipnet",
     ) -> None:
         super().__init__()
-        for name in ("input_mean", "input_std", "output_mean", "output_std"):
+        for name in ("input_mean", "output_mean", "output_std"):
             self.register_buffer(name, torch.from_numpy(getattr(norm, name).copy()))
+        gain = 1.0 / norm.input_std
+        gain[hidden_columns(hidden)] = 0.0
+        self.register_buffer("input_gain", torch.from_numpy(gain))
         self.carries_pose = norm.carries_pose
         third = width // 3
         self.encoders = nn.ModuleList(nn.Linear(s.stop - s.start, third) for s in ENCODED.values())
@@ -116,10 +143,10 @@ class ManipNet(nn.Module):
 
     def normalised(self, features: torch.Tensor) -> torch.Tensor:
         """Outputs in standard deviations from their mean, which is what the loss sees."""
-        x = (features - self.input_mean) / self.input_std
+        x = (features - self.input_mean) * self.input_gain
         parts = [
-            encode(self.dropout(x[:, columns]))
-            for encode, columns in zip(self.encoders, ENCODED.values(), strict=True)
+            encode(self.dropout(part))
+            for encode, part in zip(self.encoders, torch.split(x, _ENCODED_SIZES, dim=1), strict=True)
         ]
         return self.decoder(self.dropout(self.blocks(torch.cat(parts, dim=1))))
 
@@ -132,8 +159,10 @@ class ManipNet(nn.Module):
         return self.normalised(features) * self.output_std + self.output_mean + self._carried(features)
 
     def _carried(self, features: torch.Tensor) -> torch.Tensor:
-        pose = features[:, _POSE] if self.carries_pose else torch.zeros_like(features[:, _POSE])
-        return torch.nn.functional.pad(pose, (0, OUTPUT_SIZE - (_POSE.stop - _POSE.start)))
+        pose, _, _ = torch.split(features, _ENCODED_SIZES, dim=1)
+        if not self.carries_pose:
+            pose = torch.zeros_like(pose)
+        return torch.nn.functional.pad(pose, (0, OUTPUT_SIZE - _ENCODED_SIZES[0]))
 
 
 def export_onnx(model: ManipNet) -> bytes:

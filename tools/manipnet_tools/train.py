@@ -36,6 +36,8 @@ class TrainConfig:
     architecture: Architecture = "manipnet"
     carries_pose: bool = True
     """Predict the change of the pose, in units of its own deviation, instead of the pose."""
+    hidden: tuple[str, ...] = ()
+    """Inputs the network does not see: names of blocks, or `future`."""
     dropout: float = 0.3
     rounds: int = 12
     """New samples are made this often."""

@@ -5,7 +5,6 @@ into arrays of the caller and are what the live tick and the solver call; the fu
 """
 
 import numpy as np
-from numba import njit
 
 from manipnet.geometry import Array, quat_to_matrix
 from manipnet.hand.skeleton import (
@@ -18,6 +17,7 @@ from manipnet.hand.skeleton import (
     PARENTS,
     REST_QUATS,
 )
+from manipnet.kernels import njit
 
 _REST = quat_to_matrix(REST_QUATS)
 _FIRST_DOF = np.array([int(np.argmax(j == DOF_JOINTS)) if j in DOF_JOINTS else -1 for j in range(BONE_COUNT)])

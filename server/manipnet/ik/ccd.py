@@ -5,11 +5,11 @@ targets: with hinges that angle has a closed form.
 """
 
 import numpy as np
-from numba import njit
 
 from manipnet.hand.kinematics import forward_kinematics_into
 from manipnet.hand.skeleton import BONE_COUNT, DOF_COUNT, DOF_JOINTS, PARENTS
 from manipnet.ik.chains import DOFS, FINGERS, MOVED_JOINTS, clamp, dof_moves
+from manipnet.kernels import njit
 
 SWEEPS = 8
 

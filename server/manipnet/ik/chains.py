@@ -1,9 +1,9 @@
 """The five fingers as chains of four angles each, for the solvers: the wrist is fixed, so they are independent."""
 
 import numpy as np
-from numba import njit
 
 from manipnet.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, DOF_JOINTS, FINGER_JOINTS
+from manipnet.kernels import njit
 
 FINGERS = 5
 DOFS = 4

@@ -5,7 +5,6 @@ cost microseconds. Capsules meet the field, not the triangles: it is smooth and 
 """
 
 import numpy as np
-from numba import njit
 
 from manipnet.hand.kinematics import forward_kinematics_into
 from manipnet.hand.skeleton import BONE_COUNT, DOF_COUNT, DOF_JOINTS, PARENTS
@@ -20,6 +19,7 @@ from manipnet.ik.chains import (
     clamp,
     dof_moves,
 )
+from manipnet.kernels import njit
 from manipnet.objects.field import field_distance
 from manipnet.sensing.scene import map_direction_back, map_point
 

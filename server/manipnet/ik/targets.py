@@ -1,7 +1,6 @@
 """Where the joints should go: the network's positions corrected by its distances (paper, appendix B, algorithm 1)."""
 
-from numba import njit
-
+from manipnet.kernels import njit
 from manipnet.objects.field import signed_distance
 from manipnet.sensing.scene import map_direction_back, map_point
 

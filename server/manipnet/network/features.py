@@ -7,9 +7,9 @@ mirrored before (`mirrored` says so, because then the object's own geometry must
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from manipnet.geometry import Array
+from manipnet.kernels import njit
 from manipnet.network.layout import (
     INPUT,
     INPUT_SIZE,

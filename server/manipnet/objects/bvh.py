@@ -8,9 +8,9 @@ and Aanæs 2005), exact on closed meshes.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
 
 from manipnet.geometry import Array
+from manipnet.kernels import njit, prange
 
 _BINS = 12
 _LEAF_TRIANGLES = 3

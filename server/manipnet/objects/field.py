@@ -8,9 +8,9 @@ of a millimetre) and names a near triangle where it is not.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from manipnet.geometry import Array
+from manipnet.kernels import njit
 from manipnet.objects.bvh import Bvh, closest_point, closest_points_parallel
 
 MARGIN_M = 0.12

@@ -3,9 +3,9 @@
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from manipnet.geometry import Array
+from manipnet.kernels import njit
 from manipnet.objects.bvh import Bvh, trace_ray
 
 try:

@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from platformdirs import user_cache_dir
 from trimesh.triangles import mass_properties
 
 from manipnet.geometry import Array
+from manipnet.kernels import njit
 from manipnet.objects.bvh import Bvh, build_bvh
 from manipnet.objects.field import EXACT_WITHIN_CELLS, RESOLUTION, Field, build_field, signed_distance
 from manipnet.objects.mesh import ClosedMesh, load_mesh

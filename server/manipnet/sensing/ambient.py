@@ -1,9 +1,9 @@
 """Ambient sensor: occupancy of a 10 x 10 x 10 grid in front of the palm (paper, section 5.1)."""
 
 import numpy as np
-from numba import njit
 
 from manipnet.hand.skeleton import JOINT_NAMES, OFFSETS_M
+from manipnet.kernels import njit
 from manipnet.objects.field import field_distance
 from manipnet.sensing.scene import map_direction_back, map_point
 

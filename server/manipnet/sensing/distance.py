@@ -1,8 +1,7 @@
 """Signed distance sensors: how far the joints are from the surface, and which way it faces (paper, section 5.3)."""
 
-from numba import njit
-
 from manipnet.hand.skeleton import JOINT_COUNT
+from manipnet.kernels import njit
 from manipnet.objects.field import signed_distance
 from manipnet.sensing.scene import SENSOR_RANGE_M, map_direction_back, map_point
 

@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from manipnet.geometry import Array
 from manipnet.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
+from manipnet.kernels import njit
 from manipnet.objects.rays import RayScene
 from manipnet.sensing.scene import SENSOR_RANGE_M
 

@@ -1,7 +1,8 @@
 """Where things are, as the kernels see them: one hand's window in its own wrist frame, as if it were a right hand."""
 
 import numpy as np
-from numba import njit
+
+from manipnet.kernels import njit
 
 SENSOR_RANGE_M = 0.10
 """Where proximity and signed distances saturate (paper, section 5.2)."""

@@ -1,0 +1,48 @@
+"""Compiled loops: numba's `njit` with a cache that notices every change of the package.
+
+Numba keeps compiled code per function and renews it when that function's own file changes, not when a constant or a
+function it uses does. Here the cache folder is named by the state of the whole package, so an update never runs stale
+machine code, and it is the user's own folder, so a read-only installation is cached too.
+"""
+
+import hashlib
+import os
+import shutil
+import time
+from pathlib import Path
+
+import numba
+from numba import njit, prange
+from platformdirs import user_cache_dir
+
+__all__ = ["njit", "prange"]
+
+_KEEP_S = 7 * 86400.0
+
+
+def _package_state() -> str:
+    package = Path(__file__).parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(p for p in package.rglob("*") if p.suffix in (".py", ".npz")):
+        stat = path.stat()
+        digest.update(f"{path.relative_to(package)} {stat.st_size} {stat.st_mtime_ns}".encode())
+    return digest.hexdigest()[:16]
+
+
+def _use_own_cache() -> None:
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return
+    root = Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False)) / "kernels"
+    folder = root / _package_state()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        os.utime(folder)
+        for old in root.iterdir():
+            if time.time() - old.stat().st_mtime > _KEEP_S:
+                shutil.rmtree(old, ignore_errors=True)
+    except OSError:
+        return  # numba then falls back to the folders it knows
+    numba.config.CACHE_DIR = str(folder)
+
+
+_use_own_cache()
