@@ -1,4 +1,4 @@
-"""A model without training, for what is not about the model."""
+"""Real takes, and a model without training for what is not about the model."""
 
 import hashlib
 import json
@@ -12,8 +12,16 @@ from manipnet.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
 from manipnet.network.bundle import FORMAT
 from manipnet.network.features import pose_outputs
 from manipnet.network.layout import INPUT_SIZE, OUTPUT_SIZE, describe
+from manipnet_tools.cases import Case, load_cases
 
+TAKES = ("cyl_med3", "mug1")
 STILL_ANGLES = np.clip(np.full(20, 0.2), DOF_LIMITS_RAD[:, 0], DOF_LIMITS_RAD[:, 1])
+
+
+@pytest.fixture(scope="session")
+def cases(manipnet_data) -> dict[str, Case]:
+    """Two real takes by name."""
+    return {case.name: case for case in load_cases(manipnet_data, TAKES)}
 
 
 @pytest.fixture(scope="session")

@@ -9,11 +9,6 @@ from manipnet_tools.scoring import average, score
 
 
 @pytest.fixture(scope="module")
-def cases(manipnet_data):
-    return {case.name: case for case in load_cases(manipnet_data, ("cyl_med3", "mug1"))}
-
-
-@pytest.fixture(scope="module")
 def captured(cases):
     return {name: score(case, np.zeros((22, 3)), case.captured) for name, case in cases.items()}
 

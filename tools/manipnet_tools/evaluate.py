@@ -1,7 +1,7 @@
 """`manipnet evaluate`: roll-outs on held-out takes, beside captured fingers and hands without a network."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -14,7 +14,7 @@ from manipnet.geometry import Array
 from manipnet.network.bundle import DEFAULT_MODEL, Bundle, load_bundle
 from manipnet.synthesis import Side, SolverName, Synthesizer
 from manipnet_tools import baselines, report
-from manipnet_tools.cases import SEEN_SHARE, Case, DataError, load_cases
+from manipnet_tools.cases import SEEN_SHARE, Case, data_folders, load_cases
 from manipnet_tools.rollout import roll_out
 from manipnet_tools.scoring import Score, average, score
 
@@ -56,12 +56,13 @@ class Results:
     rows: dict[str, Row]
 
 
-def folds(cases: Sequence[Case], protocol: Protocol) -> list[Fold]:
-    """`seen`: the last fifth of every take; `unseen`: each take in turn, its object in no other."""
+def folds(cases: Sequence[Case], protocol: Protocol, takes: Container[str]) -> list[Fold]:
+    """`seen`: the last fifth of every take; `unseen`: each take in turn, its object in no other. Tests `takes` only."""
+    tested = [case for case in cases if case.name in takes]
     if protocol == "seen":
         train = [case.part(0.0, SEEN_SHARE) for case in cases]
-        return [Fold("seen", train, [case.part(SEEN_SHARE, 1.0) for case in cases])]
-    return [Fold(case.name, [other for other in cases if other.object != case.object], [case]) for case in cases]
+        return [Fold("seen", train, [case.part(SEEN_SHARE, 1.0) for case in tested])]
+    return [Fold(case.name, [other for other in cases if other.object != case.object], [case]) for case in tested]
 
 
 def evaluate(
@@ -131,15 +132,16 @@ class EvaluateOptions:
     data: Path
     """The dataset's folder, with BVH/ and meshes/."""
     model: tuple[str, ...] = (DEFAULT_MODEL,)
-    """Bundles to test, by shipped name or folder."""
-    models_dir: Path | None = None
-    """For --protocol unseen: a folder of bundles, each named by the take left out of its training."""
+    """For --protocol seen: bundles trained on the first 80 % of every take, by shipped name or folder."""
+    models_dir: tuple[Path, ...] = (Path("unseen"),)
+    """For --protocol unseen: folders of bundles, each bundle named by the take left out of its training. Those that
+    are missing are trained, which takes long, and kept there."""
     protocol: Protocol = "seen"
     """seen: the last 20 % of every take. unseen: every take with a model that has not seen its object."""
     solver: tuple[SolverName, ...] = ("least_squares", "none")
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
-    """Only these takes; all by default."""
+    """Test only these takes; all by default."""
     sweep: Sweep | None = None
     """Instead: how the last 20 % bears noise, a shorter look-ahead, other meshes, other sizes, ten minutes."""
     json: Path | None = None
@@ -165,8 +167,10 @@ def run(options: EvaluateOptions) -> None:
 
 def _protocol(options: EvaluateOptions, progress: Progress) -> tuple[dict[str, Any], list[Table]]:
     models = _models(options)
-    cases = load_cases(options.data, options.takes)
-    results = evaluate(folds(cases, options.protocol), options.protocol, models, options.solver, progress)
+    cases = load_cases(options.data)
+    takes = [folder.name for folder in data_folders(options.data, options.takes)]
+    tests = folds(cases, options.protocol, takes)
+    results = evaluate(tests, options.protocol, models, options.solver, progress)
     ours = row_name(next(iter(models)), options.solver[0])
     if options.plots:
         from manipnet_tools import plots
@@ -192,7 +196,17 @@ def _models(options: EvaluateOptions) -> dict[str, Callable[[Fold], Bundle]]:
     if options.protocol == "seen":
         bundles = [load_bundle(model) for model in options.model]
         return {bundle.name: lambda fold, bundle=bundle: bundle for bundle in bundles}
-    folder = options.models_dir
-    if folder is None:
-        raise DataError("--protocol unseen needs --models-dir: a bundle per take, trained without its object")
-    return {folder.name: lambda fold: load_bundle(folder / fold.name)}
+    return {
+        folder.name: lambda fold, folder=folder: _left_out(folder / fold.name, fold, options.data)
+        for folder in options.models_dir
+    }
+
+
+def _left_out(folder: Path, fold: Fold, data: Path) -> Bundle:
+    """The bundle of a fold, trained first if it is not there."""
+    if not (folder / "bundle.json").is_file():
+        from manipnet_tools import dataset, train
+
+        tracks = dataset.load_tracks(data, [case.name for case in fold.train])
+        train.save_bundle(train.train(tracks, train.spans_of(tracks, 1.0), train.TrainConfig()), folder)
+    return load_bundle(folder)
