@@ -1,7 +1,7 @@
 """One actor: which streamed bodies are its wrists and props, and its two hands from tick to tick."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from manipnet.props import Prop, choose_prop
 from manipnet.streams.bodies import BodyFrame, BodySample
 from manipnet.synthesis import HandScene, HandState, HandStep, Side, state_of
 from manipnet.telemetry import Counters
-from manipnet.timeline import TICK_S, BodyAtTick, Tick, Timeline
+from manipnet.timeline import TICK_S, BodyAtTick, BodyHealth, Tick, Timeline
 
 SIDES: Final[tuple[Side, Side]] = ("left", "right")
 AT_REST_RAD: Final = 0.03
@@ -151,11 +151,25 @@ class Actor:
         self._last = (plan.tick.run, plan.tick.index)
         return hands
 
-    def hold(self, plan: Plan) -> dict[Side, ShownHand]:
-        """Both hands at the plan's tick when synthesis failed: the last good fingers stay."""
+    def hold(self, tick: Tick) -> dict[Side, ShownHand]:
+        """Both hands as they were shown last, for a tick that failed."""
+        self._last = (tick.run, tick.index)
+        return {
+            side: ShownHand(replace(hand.shown, state="hold"), hand.prop)
+            for side, hand in self.hands.items()
+            if hand.shown is not None
+        }
+
+    def health(self, now_s: float) -> dict[str, BodyHealth]:
+        """Of every body of the rig, as the stream has it now; one never heard of has an infinite age."""
+        heard = self.timeline.health(now_s)
+        parts = dict.fromkeys(name for name, _ in self._parts.values())
+        return {name: heard.get(name, BodyHealth(0.0, np.inf)) for name in parts}
+
+    def recover(self) -> None:
+        """Go on from what is shown: what led to an error is forgotten."""
         for hand in self.hands.values():
             hand.recover()
-        return self.show(plan, {})
 
     def _state(self, hand: Hand, wrist: BodyAtTick | None, thing: BodyAtTick | None) -> State:
         if hand.resting:

@@ -47,7 +47,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "sender_restarts": ("source", SOURCES),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
-    "tick_errors": ("stage", ("synthesis", "publish", "dump")),
+    "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
     "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "page")),
     "control_requests": ("op", CONTROL_OPS),
@@ -56,7 +56,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
 """Every counter with its one label and the values that label may take."""
 
 
-STAGES: Final = ("buffer", "sense", "infer", "ik", "encode", "total", "interval")
+STAGES: Final = ("sense", "infer", "ik", "encode", "total", "interval")
 """What `Timings` records, seconds; `total` runs from the packet a tick waited for to its message sent."""
 
 

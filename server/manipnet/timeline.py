@@ -63,6 +63,14 @@ class BodyAtTick:
 
 
 @dataclass(frozen=True, slots=True)
+class BodyHealth:
+    """How a body arrives: the rate of its tracked samples, and the age of the newest one by the stream's clock."""
+
+    rate_hz: float
+    age_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Tick:
     """One instant to show. `bodies` holds those tracked at least once in this run; `run` counts sender
     restarts.
@@ -133,8 +141,10 @@ class Timeline:
     def __init__(self, look_ahead_s: float = MAX_LOOK_AHEAD_S, forecast: Forecast = damped_velocity) -> None:
         self.look_ahead_s = look_ahead_s
         """What is asked for; may be set at any time within 0 … `MAX_LOOK_AHEAD_S`."""
-        self.skipped = 0
+        self.skipped_late = self.skipped_at_restart = 0
+        """Ticks not shown: they fell due all at once, or a new run began before the old one had played out."""
         self.restarts = 0
+        """How often the sender's time began anew."""
         self._forecast = forecast
         self._effective_s = look_ahead_s
         self._run: Run | None = None
@@ -173,7 +183,7 @@ class Timeline:
         if self._ending is not None:
             if self._due_s(run, run.next_index) > self._reached_s(run, now_s):
                 return self._take(self._ending, self._ending.clock_s(now_s), now_s)
-            self.skipped += max(
+            self.skipped_at_restart += max(
                 int((self._ending.newest_s - self._ending.tick_s(self._ending.next_index)) * TICK_HZ), 0
             )
             self._ending = None
@@ -190,17 +200,13 @@ class Timeline:
         by_clock = max(quiet_until, run.heard_s + self._due_s(run, run.next_index) - run.newest_s)
         return max(min(by_clock, self._patience_s(run)), now_s)
 
-    def health(self, now_s: float) -> dict[str, dict[str, float]]:
-        """Per body: `rate_hz` of its samples, and `age_s` since the newest tracked one by the stream's
-        clock.
-        """
+    def health(self, now_s: float) -> dict[str, BodyHealth]:
+        """Of every body heard of in this run."""
         if self._run is None:
             return {}
         clock = self._run.clock_s(now_s)
-        return {
-            key: {"rate_hz": 1.0 / track.interval_s(), "age_s": track.age_s(clock)}
-            for key, track in self._run.tracks.items()
-        }
+        tracks = self._run.tracks.items()
+        return {key: BodyHealth(1.0 / track.interval_s(), track.age_s(clock)) for key, track in tracks}
 
     def _due_s(self, run: Run, index: int) -> float:
         """Stream time that must have arrived for a tick; the instant it shows is always part of it."""
@@ -227,7 +233,7 @@ class Timeline:
             return None
         backlog = int((limit - self._due_s(run, run.next_index)) * TICK_HZ)
         if backlog >= MAX_BACKLOG:
-            self.skipped += backlog
+            self.skipped_late += backlog
             run.next_index += backlog
         run.carried_s = now_s if self._due_s(run, run.next_index) > run.newest_s + TIME_TOLERANCE_S else None
         tick = self._tick(run, run.next_index, now_s)
