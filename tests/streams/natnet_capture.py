@@ -20,9 +20,9 @@ def folder() -> Path:
     return path
 
 
-def datagrams():
+def datagrams(path=None):
     """Every UDP datagram of the capture in order (pcapng, one Ethernet interface, microseconds)."""
-    data = (folder() / "traffic.pcapng").read_bytes()
+    data = ((path or folder()) / "traffic.pcapng").read_bytes()
     offset = 0
     while offset < len(data):
         kind, size = struct.unpack_from("<II", data, offset)

@@ -96,19 +96,62 @@ def bind_udp(what: str, host: str, port: int) -> socket.socket:
     udp: socket.socket | None = None
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        udp = socket.socket(family, socket.SOCK_DGRAM)
-        with contextlib.suppress(OSError):  # the system may allow less
-            udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        udp = _socket(family)
         udp.bind(address)
     except (OSError, UnicodeError) as error:
         if udp is not None:
             udp.close()
-        reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
         raise ListenError(
-            f"cannot listen for {what} on {host}:{port}: {reason}; "
+            f"cannot listen for {what} on {host}:{port}: {_reason(error)}; "
             "choose a free port (0 takes any) and an address of this machine"
         ) from None
     return udp
+
+
+def join_multicast(group: str, port: int, interface: str) -> socket.socket:
+    """A UDP socket that hears `group:port` through the network card with the address `interface`.
+
+    Other programs on this machine may hear the same group. Raises `ListenError`.
+    """
+    udp = _socket(socket.AF_INET)
+    try:
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if sys.platform == "darwin":
+            udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        udp.bind(("", port))
+        membership = socket.inet_aton(group) + socket.inet_aton(interface)
+        udp.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+    except OSError as error:
+        udp.close()
+        raise ListenError(
+            f"cannot join multicast {group}:{port} on interface {interface}: {_reason(error)}; "
+            "name the address of the network card that faces the server"
+        ) from None
+    return udp
+
+
+def local_address_towards(host: str, port: int) -> str:
+    """The address of the network card the system would use to reach `host`; raises `ListenError`."""
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            udp.connect((host, port))  # sends nothing
+            return udp.getsockname()[0]
+    except OSError as error:
+        raise ListenError(
+            f"no network card of this machine reaches {host}: {_reason(error)}; name its address as the interface"
+        ) from None
+
+
+def _socket(family: int) -> socket.socket:
+    udp = socket.socket(family, socket.SOCK_DGRAM)
+    with contextlib.suppress(OSError):  # the system may allow less
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+    return udp
+
+
+def _reason(error: Exception) -> str:
+    number = error.errno if isinstance(error, OSError) else None
+    return os.strerror(number) if number is not None and number > 0 else str(error)
 
 
 def kernel_drops(udp: socket.socket) -> int:
