@@ -120,7 +120,9 @@ class ManipNet(nn.Module):
         width: int = 1536,
         dropout: float = 0.3,
         architecture: Architecture = "manipnet",
+        hidden: Sequence[str] = (),
     ) -> None:
+        """`hidden` names inputs the network is not to see: blocks of the layout, or `future` beyond 0.1 s."""
         super().__init__()
         for name in ("input_mean", "output_mean", "output_std"):
             self.register_buffer(name, torch.from_numpy(getattr(norm, name).copy()))
@@ -131,9 +133,7 @@ class ManipNet(nn.Module):
         third = width // 3
         self.encoders = nn.ModuleList(nn.Linear(s.stop - s.start, third) for s in ENCODED.values())
         dense, residual = architecture == "manipnet", architecture != "mlp"
-        self.blocks = nn.Sequential(
-            *(ResidualDenseBlock(3 * third, dropout, dense, residual) for _ in range(2))
-        )
+        self.blocks = nn.Sequential(*(ResidualDenseBlock(3 * third, dropout, dense, residual) for _ in range(2)))
         self.decoder = nn.Linear(3 * third, OUTPUT_SIZE)
         self.dropout = nn.Dropout(dropout)
         for layer in self.modules():

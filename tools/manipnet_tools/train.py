@@ -82,14 +82,15 @@ def train(tracks: Sequence[HandTrack], spans: Sequence[tuple[int, int]], config:
     started = time.monotonic()
     torch.manual_seed(config.seed)
     rng = np.random.default_rng(config.seed)
-    pool = np.concatenate(
-        [track.angles[low:high:4] for track, (low, high) in zip(tracks, spans, strict=True)]
-    )
+    pool = np.concatenate([track.angles[low:high:4] for track, (low, high) in zip(tracks, spans, strict=True)])
     limits = pose_limits(pool)
     rest = np.clip(pool.mean(axis=0), limits[:, 0], limits[:, 1])
     first = _make(tracks, spans, config, pool, limits, rng, None)
     model = ManipNet(
-        normalisation(first.inputs, first.outputs, config.carries_pose), config.width, config.dropout, config.architecture
+        normalisation(first.inputs, first.outputs, config.carries_pose),
+        config.width,
+        config.dropout,
+        config.architecture,
     )
     average = torch.optim.swa_utils.AveragedModel(
         model, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.average)
@@ -144,9 +145,7 @@ def _make(tracks, spans, config: TrainConfig, pool: Array, limits: Array, rng, p
         wanted = config.self_made * np.mean([high - low for low, high in spans])
         starts = max(int(wanted / config.roll_out_ticks), 1)
         parts.append(
-            self_made_samples(
-                tracks, spans, policy, starts, config.roll_out_ticks, config.kept, pool, limits, rng
-            )
+            self_made_samples(tracks, spans, policy, starts, config.roll_out_ticks, config.kept, pool, limits, rng)
         )
     return concatenate(parts)
 

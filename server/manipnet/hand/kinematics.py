@@ -46,9 +46,7 @@ def _multiply_into(a, b, out):
 def _apply_offset_into(parent_position, parent_rotation, offset, out):
     for i in range(3):
         out[i] = parent_position[i] + (
-            parent_rotation[i, 0] * offset[0]
-            + parent_rotation[i, 1] * offset[1]
-            + parent_rotation[i, 2] * offset[2]
+            parent_rotation[i, 0] * offset[0] + parent_rotation[i, 1] * offset[1] + parent_rotation[i, 2] * offset[2]
         )
 
 
@@ -66,9 +64,7 @@ def forward_kinematics_into(angles, positions, rotations, axes):
         for dof in range(_FIRST_DOF[bone], _FIRST_DOF[bone] + _DOFS_OF_BONE[bone]):
             for i in range(3):
                 axes[dof, i] = (
-                    frame[i, 0] * DOF_AXES[dof, 0]
-                    + frame[i, 1] * DOF_AXES[dof, 1]
-                    + frame[i, 2] * DOF_AXES[dof, 2]
+                    frame[i, 0] * DOF_AXES[dof, 0] + frame[i, 1] * DOF_AXES[dof, 1] + frame[i, 2] * DOF_AXES[dof, 2]
                 )
             axis_rotation_into(DOF_AXES[dof], angles[dof], hinge)
             _multiply_into(frame, hinge, turned)

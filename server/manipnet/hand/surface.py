@@ -1,0 +1,42 @@
+"""The hand's own skin: a closed mesh with bone weights, and the 104 proximity sensors of its palm side.
+
+The data is made by `manipnet_tools.make_hand` from the skeleton; the sensors are part of what a model is trained on, so
+changing them makes every bundle unusable.
+"""
+
+from importlib.resources import as_file, files
+from typing import Final
+
+import numpy as np
+
+from manipnet.geometry import Array
+from manipnet.hand.bind import BIND_ANGLES_RAD
+from manipnet.hand.kinematics import forward_kinematics
+
+with as_file(files("manipnet.hand") / "surface.npz") as _path, open(_path, "rb") as _file:
+    _data = dict(np.load(_file, allow_pickle=False))
+
+VERTICES: Final = _data["vertices"].astype(np.float64)
+"""`(V, 3)` in the wrist frame of a right hand in the bind pose, metres."""
+FACES: Final = _data["faces"].astype(np.int32)
+"""`(F, 3)`, counter-clockwise from outside on a right hand."""
+BONES: Final = _data["bones"].astype(np.int64)
+WEIGHTS: Final = _data["weights"].astype(np.float64)
+"""The bones each vertex follows and how much, `(V, 4)`; weights sum to one."""
+
+SENSOR_BONES: Final = _data["sensor_bones"].astype(np.int64)
+SENSOR_WEIGHTS: Final = _data["sensor_weights"]
+"""The bones each sensor follows and how much, `(104, 2)`."""
+SENSOR_POINTS: Final = _data["sensor_points"]
+SENSOR_NORMALS: Final = _data["sensor_normals"]
+"""Position and outward normal of each sensor in the frame of each of its bones, `(104, 2, 3)`."""
+
+_BIND_POSITIONS, _BIND_ROTATIONS = forward_kinematics(BIND_ANGLES_RAD)
+_IN_BONE: Final = np.einsum("vkji,vkj->vki", _BIND_ROTATIONS[BONES], VERTICES[:, None] - _BIND_POSITIONS[BONES])
+
+
+def skin(positions: Array, rotations: Array) -> Array:
+    """Linear blend skinning: vertices `(..., V, 3)` of a hand with joints `positions (..., 22, 3)` and bone `rotations
+    (..., 17, 3, 3)`, in whatever frame those are in (a left hand mirrored as a whole afterwards)."""
+    moved = np.einsum("...vkij,vkj->...vki", rotations[..., BONES, :, :], _IN_BONE) + positions[..., BONES, :]
+    return np.sum(WEIGHTS[..., None] * moved, axis=-2)
