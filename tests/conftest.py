@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# the first example pays for compiling; the same examples every run
+settings.register_profile("manipnet", deadline=None, derandomize=True)
+settings.load_profile("manipnet")
 
 
 @pytest.fixture(scope="session")
