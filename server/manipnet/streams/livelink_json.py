@@ -10,22 +10,13 @@ import socket
 import numpy as np
 
 from manipnet.geometry import Array, compose, invert
+from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 from manipnet.streams.axes import to_unreal
 from manipnet.streams.wire import HandsMessage, Side
 
 DEFAULT_PORT = 54321
-FINGERS = ("index", "middle", "ring", "little")
-NAMES = (
-    "palm",
-    "wrist",
-    *(f"thumb_{part}" for part in ("metacarpal", "proximal", "distal", "tip")),
-    *(f"{f}_{part}" for f in FINGERS for part in ("metacarpal", "proximal", "intermediate", "distal", "tip")),
-)
 ORDER = (1, 0, *range(2, 26))
 """Wrist first: Live Link wants parents before children."""
-
-PARENTS = {0: 1, 2: 1, **{joint: joint - 1 for joint in range(3, 26)}, **{5 * f + 6: 1 for f in range(4)}}
-"""Parent of each joint but the wrist, as indices of the OpenXR order."""
 
 
 class LiveLinkJsonSender:
@@ -48,14 +39,14 @@ class LiveLinkJsonSender:
 def hand_json(actor: str, side: Side, joints: Array) -> bytes:
     """The datagram of one hand from its world `joints (26, 7)`."""
     local = joints.copy()
-    children = list(PARENTS)
-    parents = [PARENTS[joint] for joint in children]
+    children = list(ORDER[1:])
+    parents = [OPENXR_PARENTS[joint] for joint in children]
     local[children] = compose(invert(joints[parents]), joints[children])
     poses = np.round(to_unreal(local), 6)
     bones = [
         {
-            "Name": NAMES[joint],
-            "Parent": ORDER.index(PARENTS[joint]) if joint in PARENTS else -1,
+            "Name": OPENXR_JOINT_NAMES[joint],
+            "Parent": ORDER.index(OPENXR_PARENTS[joint]) if joint in children else -1,
             "Location": poses[joint, :3].tolist(),
             "Rotation": poses[joint, 3:].tolist(),
             "Scale": [1.0, 1.0, 1.0],
