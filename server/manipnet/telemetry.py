@@ -35,7 +35,9 @@ BODY_REASONS = (
     "bounds",
     "zero_quaternion",
     "frozen",  # tracked, but bit-identical for too long
-    "jump",  # farther from the last sample than a body can move: an identity swap
+    "jump",  # farther from the last sample than a body can move
+    "swap",  # two bodies in each other's place from one frame to the next
+    "zeros",  # at exactly the origin, far from where it was: a relay's way to say lost
 )
 
 CONTROL_OPS = ("hello", "ping", "status", "objects", "select_object", "look_ahead", "rest", "invalid")
