@@ -109,9 +109,7 @@ def residuals(hands: list[Gaps], wrench: Array, body: Body, rule: Rule = RULE) -
     out = np.linalg.norm(wrench, axis=1)
     for frame in np.flatnonzero(touching.any(axis=1)):
         which = touching[frame]
-        out[frame] = nnls(
-            cone_wrenches(point[frame, which], normal[frame, which], body, rule), wrench[frame]
-        )[1]
+        out[frame] = nnls(cone_wrenches(point[frame, which], normal[frame, which], body, rule), wrench[frame])[1]
     return out
 
 
