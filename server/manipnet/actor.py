@@ -6,9 +6,10 @@ from typing import Final
 
 import numpy as np
 
-from manipnet.config import ActorConfig, BodyKey
+from manipnet.config import WRISTS, ActorConfig, BodyKey
 from manipnet.geometry import Array, compose
 from manipnet.network.bundle import Bundle
+from manipnet.objects.shape import Shape
 from manipnet.output_guard import OutputGuard
 from manipnet.presence import HOLD_AFTER_S, Presence, Shown, State, state_at_age
 from manipnet.props import Prop, choose_prop
@@ -108,11 +109,22 @@ class Actor:
             return "unknown_body"
         return self.timeline.push(frame.t_s, poses, frame.t_received_s, frame.source)
 
-    def carry(self, key: BodyKey, prop: Prop) -> None:
-        """Let the body `key` carry `prop`, whatever it carried before."""
-        self.props = [other for other in self.props if other.name != prop.name] + [prop]
-        for alias in _aliases(key):
-            self._parts[alias] = (prop.name, self._parts.get(alias, ("", None))[1])
+    def carry(self, body: BodyKey, object_name: str, shape: Shape, scale: float) -> Prop:
+        """Let a body, by its key in the stream or its name here, carry a shape from now on.
+
+        Raises `ValueError` for the body of a wrist.
+        """
+        known = {name for name, _ in self._parts.values()}
+        if body in self._parts or body not in known:
+            name, offset = self._parts.get(body, (str(body), None))
+            self._parts |= dict.fromkeys(_aliases(body), (name, offset))
+        else:
+            name = str(body)
+        if name in WRISTS:
+            raise ValueError(f"body {body!r} is the {name}; give the body of a prop")
+        prop = Prop(name, object_name, shape, scale)
+        self.props = [other for other in self.props if other.name != name] + [prop]
+        return prop
 
     def rest(self) -> None:
         """Ease both hands to the rest pose; they are synthesised anew from there."""

@@ -5,7 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from manipnet.geometry import Array, quat_slerp
+from manipnet.geometry import Array
+from manipnet.kernels import njit
 
 KEEP: Final = 1024
 """Newest samples kept: more than 2 s at the highest rate accepted."""
@@ -98,23 +99,45 @@ def sample(tracks: Sequence[BodyTrack], times_s: Array, until_s: float, forecast
     and the one that brackets it are used. Before the first sample its pose stands; after the last one `forecast`
     continues the motion, or the last pose stands when there is none.
     """
-    known = [track.known(until_s) for track in tracks]
-    before, after, fraction = [], [], []
-    for track, count in zip(tracks, known, strict=True):
-        upper = np.clip(np.searchsorted(track.times[:count], times_s, side="right"), 1, max(count - 1, 1))
-        upper = np.minimum(upper, count - 1)
-        lower = np.maximum(upper - 1, 0)
-        span = np.maximum(track.times[upper] - track.times[lower], MIN_SPACING_S)
-        before.append(track.poses[lower])
-        after.append(track.poses[upper])
-        fraction.append(np.clip((times_s - track.times[lower]) / span, 0.0, 1.0))
-    a, b, f = np.stack(before), np.stack(after), np.stack(fraction)
-    poses = np.concatenate(
-        [a[..., :3] + f[..., None] * (b - a)[..., :3], quat_slerp(a[..., 3:], b[..., 3:], f)], axis=-1
-    )
-    if forecast is not None:
-        for row, track, count in zip(poses, tracks, known, strict=True):
-            beyond = times_s > track.times[count - 1] + TIME_TOLERANCE_S
+    poses = np.empty((len(tracks), len(times_s), 7))
+    for row, track in zip(poses, tracks, strict=True):
+        known = track.known(until_s)
+        times, samples = track.times[:known], track.poses[:known]
+        _interpolate(times, samples, times_s, row)
+        if forecast is not None:
+            beyond = times_s > times[-1] + TIME_TOLERANCE_S
             if beyond.any():
-                row[beyond] = forecast(track.times[:count], track.poses[:count], times_s[beyond])
+                row[beyond] = forecast(times, samples, times_s[beyond])
     return poses
+
+
+@njit(cache=True, nogil=True)
+def _interpolate(times, poses, at, out):
+    """Poses at the instants `at` between rising `times`, clamped at both ends, into `out`."""
+    for i in range(len(at)):
+        after = np.searchsorted(times, at[i], side="right")
+        if after == 0 or after == len(times):
+            out[i] = poses[min(after, len(times) - 1)]
+            continue
+        before = after - 1
+        fraction = (at[i] - times[before]) / (times[after] - times[before])
+        for k in range(3):
+            out[i, k] = poses[before, k] + fraction * (poses[after, k] - poses[before, k])
+        _slerp_into(poses[before, 3:], poses[after, 3:], fraction, out[i, 3:])
+
+
+@njit(cache=True, nogil=True)
+def _slerp_into(a, b, fraction, out):
+    """Between unit quaternions of one hemisphere, on the arc between them."""
+    cosine = min(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3], 1.0)
+    angle = np.arccos(cosine)
+    sine = np.sin(angle)
+    from_a, from_b = 1.0 - fraction, fraction
+    if sine > 1e-6:
+        from_a, from_b = np.sin((1.0 - fraction) * angle) / sine, np.sin(fraction * angle) / sine
+    length = 0.0
+    for k in range(4):
+        out[k] = from_a * a[k] + from_b * b[k]
+        length += out[k] * out[k]
+    for k in range(4):
+        out[k] /= np.sqrt(length)

@@ -46,7 +46,7 @@ class SilenceWatch:
         """Compare every body of every actor with what was said of it last."""
         for actor in actors:
             for body, health in actor.health(now_s).items():
-                age_s = health.age_s
+                age_s = health.age_s if math.isfinite(health.age_s) else 0.0  # not awaited before it came once
                 level = (age_s > WARN_AFTER_S) + (age_s > ERROR_AFTER_S)
                 self._say(actor.config.name, body, level, age_s)
 
@@ -59,7 +59,7 @@ class SilenceWatch:
             _log.warning("%s: %s is tracked again", actor, body)
         else:
             report = _log.error if level == 2 else _log.warning
-            report("%s: %s has not been tracked for %s", actor, body, _seconds(age_s))
+            report("%s: %s has not been tracked for %.0f s", actor, body, age_s)
 
 
 def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
@@ -95,10 +95,6 @@ def _hand(actor: Actor, side: Any) -> str:
 
 def _waited_ms(actors: Sequence[Actor]) -> float:
     return 1e3 * max(actor.timeline.look_ahead_s for actor in actors)
-
-
-def _seconds(age_s: float) -> str:
-    return f"{age_s:.0f} s" if math.isfinite(age_s) else "as long as it has been sent"
 
 
 def _finite(value: float) -> float | None:

@@ -6,6 +6,7 @@ grow.
 
 import logging
 import threading
+import time
 from collections import Counter, deque
 from collections.abc import Callable
 from typing import Final
@@ -53,7 +54,6 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
     "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "page")),
     "control_requests": ("op", CONTROL_OPS),
-    "log_lines_suppressed": ("level", ("warning", "error")),
 }
 """Every counter with its one label and the values that label may take."""
 
@@ -121,12 +121,33 @@ class Timings:
             return int(self._all[stage].get_total_count()), self._sums_s[stage]
 
 
+class StageClock:
+    """Times the stages of one tick as they end, one after another. Belongs to the tick thread."""
+
+    def __init__(self, timings: Timings) -> None:
+        self._timings = timings
+        self._since_s = 0.0
+        self.last_ms: dict[str, float] = {}
+        """The stages of the newest tick, milliseconds."""
+
+    def begin(self) -> None:
+        """A tick begins."""
+        self.last_ms, self._since_s = {}, time.monotonic()
+
+    def ended(self, stage: str) -> None:
+        """A stage has ended, and the next begins."""
+        now_s = time.monotonic()
+        self._timings.record(stage, now_s - self._since_s)
+        self.last_ms[stage] = 1e3 * (now_s - self._since_s)
+        self._since_s = now_s
+
+
 class RateLimit(logging.Filter):
     """Lets each message template through once per `interval_s`; the next one says how many it stands for."""
 
-    def __init__(self, counters: Counters, clock: Callable[[], float], interval_s: float = 5.0) -> None:
+    def __init__(self, clock: Callable[[], float], interval_s: float = 5.0) -> None:
         super().__init__()
-        self._counters, self._clock, self._interval_s = counters, clock, interval_s
+        self._clock, self._interval_s = clock, interval_s
         self._last: dict[str, tuple[float, int]] = {}
 
     def filter(self, record: logging.LogRecord) -> bool:
@@ -134,11 +155,9 @@ class RateLimit(logging.Filter):
             return True
         # Templates are literals of our code, so this map stays small whatever arrives.
         now, key = self._clock(), f"{record.name}:{record.msg}"
-        shown_at, held_back = self._last.get(key, (-np.inf, 0))
+        shown_at, held_back = self._last.get(key, (float("-inf"), 0))
         if now - shown_at < self._interval_s:
             self._last[key] = (shown_at, held_back + 1)
-            level = "error" if record.levelno >= logging.ERROR else "warning"
-            self._counters.add("log_lines_suppressed", level=level)
             return False
         self._last[key] = (now, 0)
         if held_back:

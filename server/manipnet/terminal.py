@@ -8,7 +8,7 @@ import threading
 import time
 from typing import Final
 
-from manipnet.telemetry import Counters, RateLimit
+from manipnet.telemetry import RateLimit
 
 WAITING_LINES: Final = 200
 LOG_FORMAT: Final = "%(asctime)s %(levelname)s %(name)s: %(message)s"
@@ -17,10 +17,10 @@ LOG_FORMAT: Final = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 class Terminal(logging.Handler):
     """Writes `say` to standard output and log records to standard error; drops lines nobody reads."""
 
-    def __init__(self, counters: Counters) -> None:
+    def __init__(self) -> None:
         super().__init__()
         self.setFormatter(logging.Formatter(LOG_FORMAT))
-        self.addFilter(RateLimit(counters, time.monotonic))
+        self.addFilter(RateLimit(time.monotonic))
         self._lines: queue.Queue[tuple[str, bool] | None] = queue.Queue(WAITING_LINES)
         self._thread = threading.Thread(target=self._write, name="terminal", daemon=True)
         self._thread.start()

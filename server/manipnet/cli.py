@@ -1,0 +1,132 @@
+"""`manipnet-serve`: the command line of the server."""
+
+import argparse
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from manipnet import __version__
+
+DEFAULTS = {
+    "host": "127.0.0.1",
+    "port": 5555,
+    "input_port": 5556,
+    "control_port": 5557,
+    "osc_port": 39540,
+    "page_port": 8080,
+    "model": "manipnet-small",
+    "look_ahead": 0.5,
+}
+"""Shown in the help; the values themselves live in `config.ServerConfig`, which a test compares with these."""
+
+EPILOG = """examples:
+  manipnet-serve --demo                                   a recorded performance, looped
+  manipnet-serve --mesh Box=mug.obj                       bodies left_wrist, right_wrist and Box
+  manipnet-serve --rig stage.toml --look-ahead 0.1        bodies as the rig file says
+Everything in a rig file's [server] table may be given here too, and then wins."""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The options of `manipnet-serve`."""
+    parser = argparse.ArgumentParser(
+        prog="manipnet-serve",
+        description="Synthesise fingers live from tracked wrists and props.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"manipnet {__version__}")
+    what = parser.add_argument_group("what is tracked")
+    what.add_argument("--demo", action="store_true", help="play the bundled recording through the sockets, for ever")
+    what.add_argument("--rig", type=Path, metavar="FILE", help="rig file (TOML): which body is which wrist or prop")
+    what.add_argument(
+        "--mesh", action="append", default=[], metavar="NAME=FILE", help="the body NAME carries this mesh; repeatable"
+    )
+    how = parser.add_argument_group("how fingers are made")
+    _option(how, "model", str, "NAME", "a shipped model, or the folder of one")
+    _option(how, "look_ahead", float, "SECONDS", "future to wait for, 0 … 0.5; what is missing is forecast")
+    where = parser.add_argument_group("where it listens (port 0 takes a free one)")
+    _option(where, "host", str, "ADDRESS", "address of this machine to listen on")
+    _option(where, "port", int, "PORT", "hands out, ZeroMQ PUB")
+    _option(where, "input_port", int, "PORT", "bodies in, ZeroMQ SUB")
+    _option(where, "control_port", int, "PORT", "requests, ZeroMQ REP")
+    _option(where, "osc_port", int, "PORT", "bodies in, OSC over UDP")
+    _option(where, "page_port", int, "PORT", "live page, HTTP and WebSocket")
+    where.add_argument("--metrics-port", type=int, metavar="PORT", help="Prometheus metrics, HTTP (default: none)")
+    where.add_argument("--insecure", action="store_true", help="let any machine in when --host is not loopback")
+    also = parser.add_argument_group("what else it sends")
+    also.add_argument("--vmc", metavar="HOST[:39539]", help="VMC bones, OSC over UDP")
+    also.add_argument("--livelink", metavar="HOST[:54321]", help="Unreal's JSON Live Link, UDP")
+    also.add_argument("--dump-dir", type=Path, metavar="FOLDER", help="where frames go that led to an internal error")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Serve until SIGINT or SIGTERM; the exit status: 0 after a clean stop, 1 for what cannot be served."""
+    arguments = build_parser().parse_args(argv)
+    # The libraries behind these take a second to load: --help and a mistyped option should not.
+    from manipnet.config import ConfigError
+    from manipnet.network.bundle import BundleError
+    from manipnet.objects.mesh import MeshError
+    from manipnet.server import Server
+    from manipnet.streams.intake import ListenError
+    from manipnet.terminal import Terminal
+
+    stop = _stop_on_signals()
+    terminal = Terminal()
+    logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
+    try:
+        server = Server(_configure(arguments), terminal.say)
+        server.run(stop.is_set)
+    except (ConfigError, BundleError, MeshError, ListenError) as error:
+        print(f"manipnet-serve: {error}", file=sys.stderr)
+        return 1
+    finally:
+        terminal.close()
+    return 0
+
+
+def _stop_on_signals() -> threading.Event:
+    stop = threading.Event()
+    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), lambda *_: stop.set())
+    return stop
+
+
+def _option(group: Any, name: str, kind: type, metavar: str, text: str) -> None:
+    group.add_argument(
+        f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=f"{text} (default: {DEFAULTS[name]})"
+    )
+
+
+def _configure(arguments: argparse.Namespace):
+    """Defaults, then the rig file's `[server]`, then the command line. Raises `ConfigError`."""
+    from manipnet.config import ConfigError, ServerConfig, default_actor, parse_endpoint, parse_object
+    from manipnet.rig import load_rig
+    from manipnet.streams import livelink_json, vmc
+
+    objects = tuple(parse_object(text) for text in arguments.mesh)
+    if arguments.rig is not None and (objects or arguments.demo):
+        raise ConfigError("--rig names the objects itself; leave out --mesh and --demo")
+    options: dict[str, Any] = {}
+    actors = (default_actor(objects),)
+    if arguments.rig is not None:
+        rig = load_rig(arguments.rig)
+        actors, options = rig.actors, dict(rig.server)
+    options |= {name: value for name, value in vars(arguments).items() if value is not None and value is not False}
+    if "look_ahead" in options:
+        options["look_ahead_s"] = float(options["look_ahead"])
+    for name, port in (("vmc", vmc.DEFAULT_PORT), ("livelink", livelink_json.DEFAULT_PORT)):
+        if name in options:
+            options[name] = parse_endpoint(options[name], port)
+    known = {field.name for field in fields(ServerConfig)}
+    return ServerConfig(actors, **{name: value for name, value in options.items() if name in known})
+
+
+if __name__ == "__main__":
+    sys.exit(main())

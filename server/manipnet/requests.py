@@ -1,0 +1,122 @@
+"""What clients may ask of a running server. Handlers run on the control thread and touch the actors only through the
+mailbox, between two ticks."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from manipnet import __version__
+from manipnet.actor import Actor
+from manipnet.config import SCALE_RANGE
+from manipnet.control import Handler, Request, RequestError, choice, number, ping
+from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
+from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from manipnet.mailbox import BusyError, Mailbox
+from manipnet.objects.mesh import MeshError
+from manipnet.props import Prop, Wardrobe
+from manipnet.status import status
+from manipnet.streams.wire import VERSION
+from manipnet.telemetry import Counters, Timings
+from manipnet.timeline import MAX_LOOK_AHEAD_S, TICK_HZ
+
+T = TypeVar("T")
+
+
+class Requests:
+    """The operations of `docs/protocol.md`, Control."""
+
+    def __init__(
+        self,
+        session: str,
+        model: str,
+        actors: Sequence[Actor],
+        wardrobe: Wardrobe,
+        mailbox: Mailbox,
+        counters: Counters,
+        timings: Timings,
+    ) -> None:
+        self._session, self._model = session, model
+        self._actors, self._wardrobe, self._mailbox = actors, wardrobe, mailbox
+        self._counters, self._timings = counters, timings
+        self._started_s = time.monotonic()
+
+    def handlers(self) -> Mapping[str, Handler]:
+        """One function per operation."""
+        return {
+            "hello": self._hello,
+            "ping": ping,
+            "status": self._status,
+            "objects": self._objects,
+            "select_object": self._select_object,
+            "look_ahead": self._look_ahead,
+            "rest": self._rest,
+        }
+
+    def _hello(self, _: Request) -> dict[str, Any]:
+        return {
+            "version": __version__,
+            "schema": VERSION,
+            "session": self._session,
+            "model": self._model,
+            "tick_hz": TICK_HZ,
+            "actors": [actor.config.name for actor in self._actors],
+            "joint_names": list(JOINT_NAMES),
+            "angle_names": list(DOF_NAMES),
+            "openxr_joint_names": list(OPENXR_JOINT_NAMES),
+            "objects": list(self._wardrobe.names()),
+        }
+
+    def _status(self, _: Request) -> dict[str, Any]:
+        now_s = time.monotonic()
+        report = self._ask(lambda: status(self._actors, self._counters, self._timings, now_s))
+        return {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s, **report}
+
+    def _objects(self, _: Request) -> dict[str, Any]:
+        carried = self._ask(lambda: {actor.config.name: list(actor.props) for actor in self._actors})
+        return {
+            "objects": list(self._wardrobe.names()),
+            "bodies": {actor: {prop.name: _prop(prop) for prop in props} for actor, props in carried.items()},
+        }
+
+    def _select_object(self, request: Request) -> dict[str, Any]:
+        actor = self._actor(request)
+        body = request.get("body")
+        if isinstance(body, bool) or not isinstance(body, int | str) or not 0 < len(str(body)) <= 128:
+            raise RequestError("body is missing or no name; give the streaming id or name of a body")
+        name = choice(request, "object", self._wardrobe.names())
+        scale = number(request, "scale", *SCALE_RANGE, default=1.0)
+        try:
+            shape = self._wardrobe.shape(name)  # may take a second, on this thread
+        except MeshError as error:
+            raise RequestError(str(error)) from None
+        prop = self._ask(lambda: actor.carry(body, name, shape, scale))
+        return {"actor": actor.config.name, "body": prop.name, **_prop(prop)}
+
+    def _look_ahead(self, request: Request) -> dict[str, Any]:
+        seconds = number(request, "seconds", 0.0, MAX_LOOK_AHEAD_S)
+
+        def change() -> None:
+            for actor in self._actors:
+                actor.timeline.look_ahead_s = seconds
+
+        self._ask(change)
+        return {"seconds": seconds}
+
+    def _rest(self, request: Request) -> dict[str, Any]:
+        actors = self._actors if request.get("actor") is None else [self._actor(request)]
+        self._ask(lambda: [actor.rest() for actor in actors])
+        return {"actors": [actor.config.name for actor in actors]}
+
+    def _actor(self, request: Request) -> Actor:
+        names = tuple(actor.config.name for actor in self._actors)
+        return self._actors[names.index(choice(request, "actor", names, default=names[0]))]
+
+    def _ask(self, question: Callable[[], T]) -> T:
+        try:
+            return self._mailbox.ask(question)
+        except (BusyError, ValueError) as error:
+            raise RequestError(str(error)) from None
+
+
+def _prop(prop: Prop) -> dict[str, Any]:
+    return {"object": prop.object, "scale": prop.scale}

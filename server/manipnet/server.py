@@ -1,0 +1,133 @@
+"""The life of a server: configure, start, loop, stop."""
+
+import gc
+import logging
+import secrets
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Protocol
+
+from platformdirs import user_log_path
+
+from manipnet.actor import Actor
+from manipnet.config import ActorConfig, ServerConfig, check
+from manipnet.control import Control
+from manipnet.flight_recorder import FlightRecorder
+from manipnet.mailbox import Mailbox
+from manipnet.metrics import MetricsPage
+from manipnet.network.bundle import load_bundle
+from manipnet.props import Wardrobe
+from manipnet.publisher import Publisher
+from manipnet.requests import Requests
+from manipnet.status import SilenceWatch, second_line
+from manipnet.streams.intake import ListenError
+from manipnet.streams.osc import OscBodies
+from manipnet.streams.zmq_bodies import ZmqBodies
+from manipnet.synthesis import Synthesizer
+from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.tick_loop import TickLoop
+from manipnet.warm_up import warm_up
+
+SWITCH_INTERVAL_S = 0.001
+"""How long a busy thread may keep the interpreter: a receiver must not wait the usual 5 ms for a tick."""
+WARM_UP_SHAPE = "cube"
+"""What to warm up with when there is no prop yet."""
+
+_log = logging.getLogger(__name__)
+
+
+class Receiver(Protocol):
+    """Whatever delivers bodies: listens from `start`, which raises `ListenError`, until `stop`."""
+
+    address: str
+
+    def start(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+
+class Server:
+    """One server. `say` shows a line to a person and must return at once."""
+
+    def __init__(self, config: ServerConfig, say: Callable[[str], None]) -> None:
+        """Load what is configured; listen to nothing yet. Raises `ConfigError`, `BundleError`, `MeshError`."""
+        check(config)
+        self._config, self._say = config, say
+        self.session = secrets.token_hex(8)
+        self.counters, self.timings = Counters(), Timings()
+        self._mailbox, self._wardrobe, self._watch = Mailbox(), Wardrobe(), SilenceWatch()
+        self._bundle = load_bundle(config.model)
+        self._actors = [self._actor(actor) for actor in config.actors]
+        self._shown = 0
+
+    def run(self, stopping: Callable[[], bool]) -> None:
+        """Listen, say `ready`, turn bodies into hands until `stopping`, close everything.
+
+        Raises `ListenError` for an address that is taken, and `ConfigError` for a receiver nobody knows.
+        """
+        warm_up(self._bundle, self._wardrobe.shapes() or [self._wardrobe.shape(WARM_UP_SHAPE)])
+        with ExitStack() as opened:
+            loop, addresses = self._open(opened)
+            sys.setswitchinterval(SWITCH_INTERVAL_S)
+            gc.collect()
+            gc.freeze()
+            self._say("ready " + " ".join(f"{what} {address}" for what, address in addresses.items()))
+            loop.run(stopping, self._every_second)
+
+    def _open(self, opened: ExitStack) -> tuple[TickLoop, dict[str, str]]:
+        """Every socket, and the loop between them; `opened` closes them in reverse order."""
+        config = self._config
+        publisher = Publisher(config, self.counters)
+        opened.callback(publisher.close)
+        stages = StageClock(self.timings)
+        loop = TickLoop(
+            self.session,
+            self._actors,
+            Synthesizer(self._bundle, on_stage=stages.ended),
+            stages,
+            publisher.publish,
+            self._mailbox,
+            FlightRecorder(config.dump_dir or user_log_path("manipnet", appauthor=False)),
+            self.counters,
+            self.timings,
+        )
+        requests = Requests(
+            self.session, self._bundle.name, self._actors, self._wardrobe, self._mailbox, self.counters, self.timings
+        )
+        control = Control(config.host, config.control_port, requests.handlers(), self.counters)
+        opened.callback(control.stop)
+        control.start()
+        sink, host = self._mailbox.put, config.host
+        bodies = self._listen(opened, "--input-port", ZmqBodies(sink, self.counters, host, config.input_port))
+        osc = self._listen(opened, "--osc-port", OscBodies(sink, self.counters, host, config.osc_port))
+        addresses = {
+            "hands": publisher.addresses["hands"],
+            "bodies": bodies,
+            "control": control.address,
+            "osc": osc,
+            "page": publisher.addresses["page"],
+        }
+        if config.metrics_port is not None:
+            metrics = MetricsPage(host, config.metrics_port, self.counters, self.timings)
+            opened.callback(metrics.close)
+            addresses["metrics"] = metrics.address
+        return loop, addresses
+
+    def _actor(self, config: ActorConfig) -> Actor:
+        props = [self._wardrobe.load(thing) for thing in config.objects]
+        return Actor(config, props, self._bundle, self.counters, self._config.look_ahead_s)
+
+    def _listen(self, opened: ExitStack, option: str, receiver: Receiver) -> str:
+        try:
+            receiver.start()
+        except ListenError as error:
+            raise ListenError(f"{option}: {error}") from None
+        opened.callback(receiver.stop)
+        return receiver.address
+
+    def _every_second(self, now_s: float) -> None:
+        shown = sum(actor.seq for actor in self._actors)
+        self._say(second_line(self._actors, self.counters, self.timings, shown - self._shown))
+        self._shown = shown
+        self._watch.look(self._actors, now_s)

@@ -1,0 +1,59 @@
+"""Run everything once before a client waits for it: compiled code, the network's memory, the first allocations."""
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from manipnet.actor import Actor
+from manipnet.config import default_actor
+from manipnet.flight_recorder import FlightRecorder
+from manipnet.mailbox import Mailbox
+from manipnet.network.bundle import Bundle
+from manipnet.objects.shape import Shape
+from manipnet.props import Prop
+from manipnet.streams.bodies import BodyFrame, BodySample
+from manipnet.streams.wire import encode_binary, encode_msgpack
+from manipnet.synthesis import Synthesizer
+from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.tick_loop import TickLoop
+
+FRAMES = 120
+"""Two hands at a prop for one second: about thirty ticks."""
+
+
+def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
+    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
+    for shape in shapes:
+        counters, timings, mailbox = Counters(), Timings(), Mailbox()
+        actor = Actor(default_actor(), [Prop("prop", shape.name, shape)], bundle, counters, 0.5)
+        actor.carry("prop", shape.name, shape, 1.0)
+        stages = StageClock(timings)
+        loop = TickLoop(
+            "warm-up",
+            [actor],
+            Synthesizer(bundle, on_stage=stages.ended),
+            stages,
+            lambda message: (encode_msgpack(message), encode_binary(message)),
+            mailbox,
+            FlightRecorder(Path(tempfile.gettempdir())),
+            counters,
+            timings,
+        )
+        for i in range(FRAMES):
+            mailbox.put(_frame(i / FRAMES))
+            loop.take_in(0.0)
+            while loop.step(time.monotonic()):
+                pass
+
+
+def _frame(t_s: float) -> BodyFrame:
+    swing = 0.02 * float(np.sin(2.0 * np.pi * t_s))
+    bodies = (
+        BodySample(None, "left_wrist", (0.15, swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),
+        BodySample(None, "right_wrist", (-0.15, -swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),
+        BodySample(None, "prop", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True),
+    )
+    return BodyFrame(t_s, None, bodies, time.monotonic(), "warm-up")
