@@ -147,7 +147,7 @@ def files() -> dict[Path, str]:
     return {
         FOLDER / "python/manipnet_client/layout.py": python_layout(),
         FOLDER / "unity/com.manipnet.client/Runtime/Core/Layout.cs": csharp_layout(),
-        FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Core/Layout.h": cpp_layout(),
+        FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/Layout.h": cpp_layout(),
         FOLDER / "web/layout.js": javascript_layout(),
     }
 

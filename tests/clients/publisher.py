@@ -7,6 +7,7 @@ import time
 import numpy as np
 import zmq
 
+from manipnet.streams.websocket import WebSocketPublisher
 from manipnet.streams.wire import (
     TOPIC_BIN,
     TOPIC_MSGPACK,
@@ -39,6 +40,7 @@ def message(seq: int, t_capture: float, x_m: float, session: str = "s") -> Hands
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", type=int, default=0)
+    parser.add_argument("--websocket-port", type=int, default=0)
     parser.add_argument("--session", default="s")
     parser.add_argument("--rate", type=float, default=RATE_HZ)
     options = parser.parse_args()
@@ -49,13 +51,16 @@ def main() -> None:
     port = options.port or socket.bind_to_random_port("tcp://127.0.0.1")
     if options.port:
         socket.bind(f"tcp://127.0.0.1:{port}")
-    print(f"ready tcp://127.0.0.1:{port}", flush=True)
+    websocket = WebSocketPublisher("127.0.0.1", options.websocket_port)
+    print(f"ready tcp://127.0.0.1:{port} {websocket.address}", flush=True)
     start = time.monotonic()
     for seq in itertools.count():
         due = start + seq / options.rate
         time.sleep(max(due - time.monotonic(), 0.0))
         out = message(seq, seq / RATE_HZ, np.sin(seq / RATE_HZ), options.session)
-        socket.send(TOPIC_BIN + encode_binary(out))
+        payload = encode_binary(out)
+        socket.send(TOPIC_BIN + payload)
+        websocket.publish(payload)
         socket.send(TOPIC_MSGPACK + encode_msgpack(out))
 
 

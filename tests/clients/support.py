@@ -23,15 +23,15 @@ def need(*tools: str) -> list[str]:
 
 
 @contextmanager
-def publishing(*options: str) -> Iterator[tuple[subprocess.Popen, str]]:
-    """A process that publishes hands; yields it and its tcp:// address once it listens."""
+def publishing(*options: str) -> Iterator[tuple[subprocess.Popen, str, str]]:
+    """A process that publishes hands; yields it, its tcp:// and its ws:// address once it listens."""
     command = [sys.executable, str(Path(__file__).parent / "publisher.py"), *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
-        word, address = process.stdout.readline().split()
+        word, tcp, websocket = process.stdout.readline().split()
         assert word == "ready"
-        yield process, address
+        yield process, tcp, websocket
     finally:
         process.kill()
         process.wait()

@@ -62,14 +62,14 @@ def test_parse_address():
 
 
 def test_every_frame_arrives():
-    with publishing() as (_, address), Client(address) as client:
+    with publishing() as (_, address, _), Client(address) as client:
         while client.stats().received < 60:
             assert client.wait(after=client.newest, timeout_s=10)
         assert client.stats().lost == 0
 
 
 def test_iteration_in_one_line():
-    with publishing() as (_, address):
+    with publishing() as (_, address, _):
         stream = subscribe(address)
         seqs = [next(stream).seq for _ in range(3)]
         stream.close()
@@ -85,14 +85,14 @@ def test_async_iteration():
                 break
         return seen
 
-    with publishing() as (_, address):
+    with publishing() as (_, address, _):
         seqs = asyncio.run(asyncio.wait_for(first_three(address), 20))
     assert seqs == sorted(seqs)
 
 
 def test_server_killed_and_restarted():
     threads = threading.active_count()
-    with publishing("--session", "a") as (process, address), Client(address) as client:
+    with publishing("--session", "a") as (process, address, _), Client(address) as client:
         before = client.wait(timeout_s=10)
         assert before.session == "a"
         process.kill()
@@ -110,7 +110,7 @@ def test_server_killed_and_restarted():
 
 
 def test_a_stalled_publisher_is_no_reason_to_disconnect():
-    with publishing() as (process, address), Client(address) as client:
+    with publishing() as (process, address, _), Client(address) as client:
         hands = client.wait(timeout_s=10)
         os.kill(process.pid, signal.SIGSTOP)
         os.kill(process.pid, signal.SIGCONT)
@@ -119,7 +119,7 @@ def test_a_stalled_publisher_is_no_reason_to_disconnect():
 
 
 def test_interpolates_at_display_rate():
-    with publishing() as (_, address), Client(address) as client:
+    with publishing() as (_, address, _), Client(address) as client:
         client.wait(timeout_s=10)
         shown = client.sample()
         assert shown.weight == 1.0
@@ -127,7 +127,7 @@ def test_interpolates_at_display_rate():
 
 
 def test_only_the_chosen_actor():
-    with publishing() as (_, address), Client(address, actor="nobody") as client:
+    with publishing() as (_, address, _), Client(address, actor="nobody") as client:
         assert client.wait(timeout_s=0.3) is None
 
 

@@ -1,15 +1,19 @@
-"""Hands out to browsers: each binary WebSocket message is one `pose/bin` payload, the newest wins."""
+"""Hands out to browsers: each binary WebSocket message is one `pose/bin` payload, a slow reader skips."""
 
 import asyncio
 import contextlib
 import re
 import threading
+from collections import deque
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 MAX_CLIENTS = 32
+QUEUE_LENGTH = 8
+"""Payloads a client may be behind, an eighth of a second; then the oldest go."""
+
 MAX_REQUEST_BYTES = 1024
 """Clients have nothing to say."""
 
@@ -26,8 +30,7 @@ class WebSocketPublisher:
     """
 
     def __init__(self, host: str, port: int) -> None:
-        self._clients: set[asyncio.Event] = set()
-        self._payload = b""
+        self._clients: dict[asyncio.Event, deque[bytes]] = {}
         self._loop = asyncio.new_event_loop()
         try:
             self._server = self._loop.run_until_complete(self._serve(host, port))
@@ -69,31 +72,32 @@ class WebSocketPublisher:
         await self._server.wait_closed()
 
     def _offer(self, payload: bytes) -> None:
-        self._payload = payload
-        for news in self._clients:
+        for news, queue in self._clients.items():
+            queue.append(payload)
             news.set()
 
     async def _feed(self, connection: ServerConnection) -> None:
-        """Send what is newest whenever the client has taken the last."""
+        """Send what has come whenever the client has taken the last."""
         if len(self._clients) >= MAX_CLIENTS:
             await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_CLIENTS} clients")
             return
         news = asyncio.Event()
-        self._clients.add(news)
-        drain = asyncio.create_task(self._ignore(connection, news))
+        queue = self._clients[news] = deque[bytes](maxlen=QUEUE_LENGTH)
+        reading = asyncio.create_task(self._ignore(connection, news))
         try:
-            while True:
+            while not reading.done():
                 await news.wait()
                 news.clear()
-                await connection.send(self._payload)
+                while queue:
+                    await connection.send(queue.popleft())
         except ConnectionClosed:
             pass
         finally:
-            self._clients.discard(news)
-            drain.cancel()
+            del self._clients[news]
+            reading.cancel()
 
     async def _ignore(self, connection: ServerConnection, news: asyncio.Event) -> None:
-        """Read and forget, so that a closed connection is noticed even while nothing is published."""
+        """Read and forget, so that a connection closed while nothing is published does not linger."""
         with contextlib.suppress(ConnectionClosed):
             async for _ in connection:
                 pass

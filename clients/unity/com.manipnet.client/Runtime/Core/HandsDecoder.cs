@@ -1,0 +1,98 @@
+using System;
+
+namespace ManipNet.Client
+{
+    /// <summary>Reads the payload of `pose/bin`, see docs/protocol.md. Allocates only to explain a refusal.</summary>
+    public static class HandsDecoder
+    {
+        /// <summary>Null when the frame was read, else what was wrong; the frame is then in an undefined state.</summary>
+        public static string Decode(byte[] data, int start, int length, HandsFrame frame)
+        {
+            if (length < Layout.HeaderBytes || BitConverter.ToInt32(data, start) != Layout.Magic)
+                return "not a pose/bin message: it must start with MNPL and a whole header";
+            int version = U16(data, start + Layout.HeaderVersion);
+            if (version != Layout.Version)
+                return "message is of version " + version + "; this reader understands version " + Layout.Version;
+            int headerSize = U16(data, start + Layout.HeaderHeaderSize);
+            int handSize = U16(data, start + Layout.HeaderHandSize);
+            int bodySize = U16(data, start + Layout.HeaderBodySize);
+            int hands = U16(data, start + Layout.HeaderHandCount);
+            int bodies = U16(data, start + Layout.HeaderBodyCount);
+            if (headerSize < Layout.HeaderBytes || handSize < Layout.HandBytes || bodySize < Layout.BodyBytes)
+                return "a record is shorter than its fields";
+            if (hands > 2 || bodies > Layout.MaxBodies)
+                return hands + " hands and " + bodies + " bodies; 2 and " + Layout.MaxBodies + " are allowed";
+            int total = headerSize + hands * handSize + bodies * bodySize;
+            if (length != total || BitConverter.ToUInt32(data, start + Layout.HeaderTotalSize) != total)
+                return "message has " + length + " bytes; its header promises " + total;
+
+            string error = Header(data, start, frame);
+            int at = start + headerSize;
+            for (int i = 0; error == null && i < hands; i++, at += handSize) error = Hand(data, at, frame);
+            frame.SetBodyCount(error == null ? bodies : 0);
+            for (int i = 0; error == null && i < bodies; i++, at += bodySize) error = Body(data, at, frame.Body(i));
+            return error;
+        }
+
+        static string Header(byte[] data, int at, HandsFrame frame)
+        {
+            frame.Seq = BitConverter.ToUInt64(data, at + Layout.HeaderSeq);
+            frame.TCapture = BitConverter.ToDouble(data, at + Layout.HeaderTCapture);
+            frame.TPublish = BitConverter.ToDouble(data, at + Layout.HeaderTPublish);
+            frame.LookAhead = BitConverter.ToDouble(data, at + Layout.HeaderLookAhead);
+            frame.Left.Present = frame.Right.Present = false;
+            double times = frame.TCapture + frame.TPublish + frame.LookAhead;
+            if (!IsFinite(times) || !Floats(data, at + Layout.HeaderLatencyMs, frame.LatencyMs))
+                return "the header holds a number that is not finite";
+            if (!frame.Session.Read(data, at + Layout.HeaderSession) || !frame.Actor.Read(data, at + Layout.HeaderActor))
+                return "the name of the session or the actor is too long or not UTF-8";
+            return null;
+        }
+
+        static string Hand(byte[] data, int at, HandsFrame frame)
+        {
+            int side = data[at + Layout.HandSide];
+            int state = data[at + Layout.HandState];
+            if (side > 1) return "side is " + side + "; allowed are 0 (left) and 1 (right)";
+            if (state > 2) return "state is " + state + "; allowed are 0 (live), 1 (hold) and 2 (rest)";
+            HandFrame hand = frame.Hand((Side)side);
+            if (hand.Present) return "the same hand occurs twice; once is allowed";
+            hand.Present = true;
+            hand.State = (HandState)state;
+            hand.HasObject = data[at + Layout.HandHasObject] != 0;
+            if (!hand.Object.Read(data, at + Layout.HandObject)) return "the object's name is too long or not UTF-8";
+            hand.Scale = BitConverter.ToSingle(data, at + Layout.HandScale);
+            bool finite = IsFinite(hand.Scale)
+                & Floats(data, at + Layout.HandAngles, hand.Angles)
+                & Floats(data, at + Layout.HandRotations, hand.Rotations)
+                & Floats(data, at + Layout.HandWrist, hand.Wrist)
+                & Floats(data, at + Layout.HandJoints, hand.Joints);
+            return finite ? null : "a hand holds a number that is not finite";
+        }
+
+        static string Body(byte[] data, int at, BodyFrame body)
+        {
+            body.Tracked = data[at + Layout.BodyTracked] != 0;
+            if (!body.Name.Read(data, at + Layout.BodyName)) return "a body's name is too long or not UTF-8";
+            return Floats(data, at + Layout.BodyPose, body.Pose) ? null : "a body holds a number that is not finite";
+        }
+
+        static bool Floats(byte[] data, int at, float[] into)
+        {
+            Buffer.BlockCopy(data, at, into, 0, 4 * into.Length);
+            bool finite = true;
+            for (int i = 0; i < into.Length; i++) finite &= IsFinite(into[i]);
+            return finite;
+        }
+
+        static bool IsFinite(double x)
+        {
+            return x - x == 0.0;
+        }
+
+        static int U16(byte[] data, int at)
+        {
+            return data[at] | data[at + 1] << 8;
+        }
+    }
+}

@@ -1,0 +1,114 @@
+using System;
+
+namespace ManipNet.Client
+{
+    public enum Side { Left = 0, Right = 1 }
+
+    public enum HandState { Live = 0, Hold = 1, Rest = 2 }
+
+    /// <summary>One hand in the project frame: right-handed, Y up, metres, quaternions xyzw.</summary>
+    public sealed class HandFrame
+    {
+        public bool Present;
+        public HandState State;
+        public bool HasObject;
+        public readonly FixedName Object = new FixedName();
+        public float Scale = 1f;
+
+        /// <summary>20 joint angles, radians, in the order of Layout.AngleNames.</summary>
+        public readonly float[] Angles = new float[Layout.AngleCount];
+
+        /// <summary>17 quaternions local to the parent bone, in the order of Layout.BoneNames.</summary>
+        public readonly float[] Rotations = new float[4 * Layout.BoneCount];
+
+        /// <summary>The wrist in the world: position, quaternion.</summary>
+        public readonly float[] Wrist = new float[7];
+
+        /// <summary>26 OpenXR joints in the world: position, quaternion each.</summary>
+        public readonly float[] Joints = new float[7 * Layout.JointCount];
+
+        public void CopyFrom(HandFrame other)
+        {
+            Present = other.Present;
+            State = other.State;
+            HasObject = other.HasObject;
+            Object.CopyFrom(other.Object);
+            Scale = other.Scale;
+            Array.Copy(other.Angles, Angles, Angles.Length);
+            Array.Copy(other.Rotations, Rotations, Rotations.Length);
+            Array.Copy(other.Wrist, Wrist, Wrist.Length);
+            Array.Copy(other.Joints, Joints, Joints.Length);
+        }
+    }
+
+    /// <summary>A tracked body in the world: position, quaternion.</summary>
+    public sealed class BodyFrame
+    {
+        public readonly FixedName Name = new FixedName();
+        public bool Tracked;
+        public readonly float[] Pose = new float[7];
+
+        public void CopyFrom(BodyFrame other)
+        {
+            Name.CopyFrom(other.Name);
+            Tracked = other.Tracked;
+            Array.Copy(other.Pose, Pose, Pose.Length);
+        }
+    }
+
+    /// <summary>One message, in memory that is used again and again.</summary>
+    public sealed class HandsFrame
+    {
+        public readonly FixedName Session = new FixedName();
+        public readonly FixedName Actor = new FixedName();
+        public ulong Seq;
+        public double TCapture;
+        public double TPublish;
+        public double LookAhead;
+
+        /// <summary>buffer, sense, infer, ik, total.</summary>
+        public readonly float[] LatencyMs = new float[5];
+
+        public readonly HandFrame Left = new HandFrame();
+        public readonly HandFrame Right = new HandFrame();
+        public int BodyCount { get; private set; }
+        BodyFrame[] _bodies = new BodyFrame[0];
+
+        public HandFrame Hand(Side side)
+        {
+            return side == Side.Left ? Left : Right;
+        }
+
+        public BodyFrame Body(int index)
+        {
+            return _bodies[index];
+        }
+
+        /// <summary>Make room for so many bodies; allocates only when there were never as many.</summary>
+        public void SetBodyCount(int count)
+        {
+            if (count > _bodies.Length)
+            {
+                int known = _bodies.Length;
+                Array.Resize(ref _bodies, count);
+                for (int i = known; i < count; i++) _bodies[i] = new BodyFrame();
+            }
+            BodyCount = count;
+        }
+
+        public void CopyFrom(HandsFrame other)
+        {
+            Session.CopyFrom(other.Session);
+            Actor.CopyFrom(other.Actor);
+            Seq = other.Seq;
+            TCapture = other.TCapture;
+            TPublish = other.TPublish;
+            LookAhead = other.LookAhead;
+            Array.Copy(other.LatencyMs, LatencyMs, LatencyMs.Length);
+            Left.CopyFrom(other.Left);
+            Right.CopyFrom(other.Right);
+            SetBodyCount(other.BodyCount);
+            for (int i = 0; i < BodyCount; i++) _bodies[i].CopyFrom(other._bodies[i]);
+        }
+    }
+}

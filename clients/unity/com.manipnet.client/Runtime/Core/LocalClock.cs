@@ -1,0 +1,15 @@
+using System.Diagnostics;
+
+namespace ManipNet.Client
+{
+    /// <summary>Seconds of a clock that never goes back.</summary>
+    public static class LocalClock
+    {
+        static readonly double Period = 1.0 / Stopwatch.Frequency;
+
+        public static double Now
+        {
+            get { return Stopwatch.GetTimestamp() * Period; }
+        }
+    }
+}

@@ -1,0 +1,140 @@
+#include "Client.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+#include "Decoder.h"
+#include "LocalClock.h"
+
+namespace manipnet {
+namespace {
+
+constexpr int kBackOffMs = 100;
+constexpr int kBackOffLimitMs = 1000;
+
+}  // namespace
+
+std::string ParseAddress(const std::string& address, std::string& host, std::uint16_t& port) {
+    static const std::string kScheme = "tcp://";
+    const std::size_t colon = address.rfind(':');
+    unsigned long number = 0;
+    bool good = address.compare(0, kScheme.size(), kScheme) == 0 && colon > kScheme.size() && colon != std::string::npos;
+    for (std::size_t i = colon + 1; good && i < address.size(); ++i) {
+        good = address[i] >= '0' && address[i] <= '9';
+        number = std::min(10 * number + static_cast<unsigned long>(address[i] - '0'), 65536UL);
+    }
+    if (!good || number == 0 || number > 65535)
+        return "address is \"" + address + "\"; allowed is tcp://HOST:PORT, as in tcp://127.0.0.1:5555";
+    host = address.substr(kScheme.size(), colon - kScheme.size());
+    if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+    port = static_cast<std::uint16_t>(number);
+    return {};
+}
+
+Client::Client(std::string host, std::uint16_t port, std::string actor, double delayS)
+    : Host(std::move(host)), Port(port), OnlyActor(std::move(actor)), Subscriber(layout::kMaxPayloadBytes, Stopping) {
+    Frames.DelayS = delayS;
+    Thread = std::thread([this] { Run(); });
+}
+
+Client::~Client() {
+    {
+        const std::lock_guard<std::mutex> guard(Lock);
+        Stopping = true;
+    }
+    Wake.notify_all();
+    Thread.join();
+}
+
+bool Client::Sample(double now, HandsFrame& output, float& weight) {
+    const std::lock_guard<std::mutex> guard(Lock);
+    return Frames.Sample(now, output, weight);
+}
+
+Stats Client::GetStats() const {
+    const std::lock_guard<std::mutex> guard(Lock);
+    Stats stats = Counted;
+    const double now = LocalNow();
+    stats.Late = Frames.Late;
+    stats.AgeS = stats.Received > 0 ? now - NewestAt : -1.0;
+    const auto known = std::min<std::size_t>(static_cast<std::size_t>(stats.Received), Arrivals.size());
+    double earliest = now;
+    double latest = 0.0;
+    int recent = 0;
+    for (std::size_t i = 0; i < known; ++i) {
+        if (now - Arrivals[i] > 1.0) continue;
+        ++recent;
+        earliest = std::min(earliest, Arrivals[i]);
+        latest = std::max(latest, Arrivals[i]);
+    }
+    stats.RateHz = recent > 1 ? (recent - 1) / (latest - earliest) : 0.0;
+    return stats;
+}
+
+void Client::Run() {
+    int wait = kBackOffMs;
+    while (!Stopping) {
+        const std::int64_t before = Counted.Received;
+        const std::string error = Read();
+        Subscriber.Close();
+        SetState("reconnecting: " + error);
+        wait = Counted.Received > before ? kBackOffMs : std::min(2 * wait, kBackOffLimitMs);
+        std::unique_lock<std::mutex> guard(Lock);
+        Wake.wait_for(guard, std::chrono::milliseconds(wait), [this] { return Stopping.load(); });
+    }
+    SetState("closed");
+}
+
+/// Until the connection breaks; returns why it did.
+std::string Client::Read() {
+    const std::string error = Subscriber.Open(Host, Port, layout::kTopic);
+    if (!error.empty()) return error;
+    {
+        const std::lock_guard<std::mutex> guard(Lock);
+        ++Counted.Connections;
+    }
+    SetState("connected");
+    while (!Stopping) {
+        const ZmtpSubscriber::Next next = Subscriber.NextMessage();
+        if (next == ZmtpSubscriber::Next::Broken) return Subscriber.Error();
+        if (next == ZmtpSubscriber::Next::Message) Take(LocalNow());
+    }
+    return {};
+}
+
+void Client::Take(double arrival) {
+    constexpr std::size_t topic = sizeof layout::kTopic - 1;
+    const std::uint8_t* message = Subscriber.Message();
+    const std::size_t length = Subscriber.MessageLength();
+    if (length < topic || std::memcmp(message, layout::kTopic, topic) != 0) return;
+    const std::string error = Decode(message + topic, length - topic, *Spare);
+    if (!error.empty()) {
+        SetState("message refused: " + error);
+        const std::lock_guard<std::mutex> guard(Lock);
+        ++Counted.Refused;
+        return;
+    }
+    const std::lock_guard<std::mutex> guard(Lock);
+    if (!IsOurActor()) return;
+    Actor = Spare->Actor;
+    const bool same = Counted.Received > 0 && Spare->Session == Session;
+    if (same && Spare->Seq > Seq + 1) Counted.Lost += static_cast<std::int64_t>(Spare->Seq - Seq - 1);
+    Session = Spare->Session;
+    Seq = Spare->Seq;
+    Arrivals[static_cast<std::size_t>(Counted.Received++) % Arrivals.size()] = arrival;
+    if (Frames.Push(Spare, arrival)) NewestAt = arrival;
+    if (Counted.State != "connected") Counted.State = "connected";
+}
+
+bool Client::IsOurActor() const {
+    if (!OnlyActor.empty()) return OnlyActor == Spare->Actor.Text;
+    return Counted.Received == 0 || Spare->Actor == Actor;
+}
+
+void Client::SetState(const std::string& state) {
+    const std::lock_guard<std::mutex> guard(Lock);
+    Counted.State = state;
+}
+
+}  // namespace manipnet

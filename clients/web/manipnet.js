@@ -1,0 +1,136 @@
+// Receive the fingers of ManipNet Live in a browser.
+//
+//   const client = new ManipNetClient("ws://127.0.0.1:8081");
+//   function draw() {
+//     if (client.sample()) show(client.hands.left.joints, client.weight);
+//     requestAnimationFrame(draw);
+//   }
+import { decode, HandsFrame } from "./frame.js";
+import { Interpolator } from "./interpolator.js";
+import { RATE_HZ } from "./layout.js";
+
+export { decode, HandsFrame } from "./frame.js";
+export { Interpolator } from "./interpolator.js";
+export { ANGLE_NAMES, BONE_NAMES, JOINT_NAMES, JOINT_PARENTS } from "./layout.js";
+
+const BACK_OFF_MS = 100;
+const BACK_OFF_LIMIT_MS = 1000;
+const DEAD_AFTER_MS = 5000;
+
+/** Receives the hands of one actor (the first seen, unless named) and reconnects by itself. */
+export class ManipNetClient {
+  #address;
+  #actor;
+  #interpolator;
+  #socket = null;
+  #spare = new HandsFrame();
+  #arrivals = new Float64Array(RATE_HZ);
+  #waitMs = BACK_OFF_MS;
+  #timer = null;
+  #watch;
+  #closed = false;
+  #session = null;
+  #seq = 0;
+  #heardMs = 0;
+  #newestAt = -Infinity;
+  #counts = { state: "connecting", received: 0, lost: 0, refused: 0, connections: 0 };
+
+  /** `address`: as the server's `ready` line tells it, "ws://HOST:PORT". Throws for one that is none. */
+  constructor(address, { actor = null, delayS = 0.1 } = {}) {
+    if (!/^wss?:\/\/[^/]+/.test(address)) {
+      throw new Error(`address is "${address}"; allowed is ws://HOST:PORT, as in ws://127.0.0.1:8081`);
+    }
+    this.#address = address;
+    this.#actor = actor;
+    this.#interpolator = new Interpolator(delayS);
+    this.#watch = setInterval(() => this.#checkAlive(), 500);
+    this.#connect();
+  }
+
+  /** What `sample` made: a HandsFrame that the next call overwrites. */
+  get hands() {
+    return this.#interpolator.output;
+  }
+
+  /** Falls from 1 to 0 when the stream is lost: mix your own animation in by it. */
+  get weight() {
+    return this.#interpolator.weight;
+  }
+
+  /** Set `hands` and `weight` for now (seconds of performance.now). False before the first frame. */
+  sample(nowS = performance.now() / 1000) {
+    return this.#interpolator.sample(nowS);
+  }
+
+  /** Counters and rates: state, received, late, lost, refused, connections, rateHz, ageS. */
+  stats() {
+    const now = performance.now() / 1000;
+    const known = this.#arrivals.subarray(0, Math.min(this.#counts.received, RATE_HZ));
+    const recent = known.filter((t) => now - t <= 1);
+    const span = recent.length > 1 ? Math.max(...recent) - Math.min(...recent) : 0;
+    const rateHz = span > 0 ? (recent.length - 1) / span : 0;
+    return { ...this.#counts, late: this.#interpolator.late, rateHz, ageS: now - this.#newestAt };
+  }
+
+  close() {
+    this.#closed = true;
+    this.#counts.state = "closed";
+    clearTimeout(this.#timer);
+    clearInterval(this.#watch);
+    this.#socket?.close();
+  }
+
+  #connect() {
+    const socket = new WebSocket(this.#address);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.#heardMs = performance.now();
+      this.#counts.connections++;
+      this.#counts.state = "connected";
+    };
+    socket.onmessage = (event) => {
+      if (socket === this.#socket) this.#take(event.data, performance.now() / 1000);
+    };
+    socket.onclose = socket.onerror = () => this.#retry(socket);
+    this.#socket = socket;
+  }
+
+  #retry(socket) {
+    if (this.#closed || socket !== this.#socket) return; // an error may or may not be followed by a close
+    this.#socket = null;
+    this.#counts.state = "reconnecting";
+    this.#timer = setTimeout(() => this.#connect(), this.#waitMs);
+    this.#waitMs = Math.min(2 * this.#waitMs, BACK_OFF_LIMIT_MS);
+  }
+
+  /** A server that vanished without a word leaves the socket open for minutes. */
+  #checkAlive() {
+    const open = this.#socket?.readyState === WebSocket.OPEN;
+    if (!open || performance.now() - this.#heardMs < DEAD_AFTER_MS) return;
+    const socket = this.#socket;
+    this.#retry(socket);
+    socket.close();
+  }
+
+  #take(data, arrival) {
+    this.#heardMs = 1000 * arrival;
+    try {
+      decode(data, this.#spare);
+    } catch (error) {
+      this.#counts.refused++;
+      this.#counts.state = `message refused: ${error.message}`;
+      return;
+    }
+    const frame = this.#spare;
+    this.#actor ??= frame.actor;
+    if (frame.actor !== this.#actor) return;
+    if (frame.session === this.#session) this.#counts.lost += Math.max(frame.seq - this.#seq - 1, 0);
+    this.#session = frame.session;
+    this.#seq = frame.seq;
+    this.#arrivals[this.#counts.received++ % RATE_HZ] = arrival;
+    this.#waitMs = BACK_OFF_MS;
+    this.#counts.state = "connected";
+    this.#spare = this.#interpolator.push(frame, arrival);
+    if (this.#spare !== frame) this.#newestAt = arrival;
+  }
+}

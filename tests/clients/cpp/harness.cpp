@@ -1,0 +1,196 @@
+// Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS`. Talks in text lines.
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <new>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "Axes.h"
+#include "Client.h"
+#include "Decoder.h"
+#include "Interpolator.h"
+#include "LocalClock.h"
+
+using namespace manipnet;
+
+namespace {
+
+std::atomic<long> Allocations{0};
+
+std::string Number(double value, const char* format = "%.17g") {
+    char text[40];
+    std::snprintf(text, sizeof text, format, value);
+    return text;
+}
+
+template <typename Values>
+std::string Floats(const Values& values) {
+    std::string text = "[";
+    for (const float value : values) text += (text.size() > 1 ? "," : "") + Number(static_cast<double>(value), "%.9g");
+    return text + "]";
+}
+
+std::string Quote(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) out += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+    return out + "\"";
+}
+
+std::string Describe(const HandsFrame& frame) {
+    std::string text = "{\"session\":" + Quote(frame.Session.Text) + ",\"actor\":" + Quote(frame.Actor.Text);
+    text += ",\"seq\":" + std::to_string(frame.Seq) + ",\"t_capture\":" + Number(frame.TCapture);
+    text += ",\"t_publish\":" + Number(frame.TPublish) + ",\"look_ahead\":" + Number(frame.LookAhead);
+    text += ",\"latency_ms\":" + Floats(frame.LatencyMs) + ",\"hands\":{";
+    std::string comma;
+    for (const Side side : {Side::Left, Side::Right}) {
+        const HandFrame& hand = frame.Hand(side);
+        if (!hand.Present) continue;
+        text += comma + (side == Side::Left ? "\"left\"" : "\"right\"");
+        text += ":{\"state\":" + Quote(layout::kStates[hand.State]);
+        text += ",\"object\":" + (hand.HasObject ? Quote(hand.Object.Text) : "null");
+        text += ",\"scale\":" + Number(static_cast<double>(hand.Scale)) + ",\"angles\":" + Floats(hand.Angles);
+        text += ",\"rotations\":" + Floats(hand.Rotations) + ",\"wrist\":" + Floats(hand.Wrist);
+        text += ",\"joints\":" + Floats(hand.Joints) + "}";
+        comma = ",";
+    }
+    text += "},\"bodies\":[";
+    for (std::size_t i = 0; i < frame.BodyCount; ++i) {
+        const BodyFrame& body = frame.Bodies[i];
+        text += (i > 0 ? "," : "") + std::string("{\"name\":") + Quote(body.BodyName.Text);
+        text += ",\"tracked\":" + std::string(body.Tracked ? "true" : "false") + ",\"pose\":" + Floats(body.Pose) + "}";
+    }
+    return text + "]}";
+}
+
+void DecodeFile(const char* path) {
+    std::ifstream file(path, std::ios::binary);
+    const std::vector<char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    // An exact heap copy, so that the sanitizer sees any read beyond the end.
+    const std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
+    HandsFrame frame;
+    const std::string error = Decode(data.data(), data.size(), frame);
+    std::cout << (error.empty() ? Describe(frame) : "{\"error\":" + Quote(error) + "}") << "\n";
+}
+
+std::vector<std::uint8_t> FromHex(const std::string& hex) {
+    std::vector<std::uint8_t> data(hex.size() / 2);
+    for (std::size_t i = 0; i < data.size(); ++i)
+        data[i] = static_cast<std::uint8_t>(std::strtoul(hex.substr(2 * i, 2).c_str(), nullptr, 16));
+    return data;
+}
+
+void Interpolate() {
+    Interpolator interpolator;
+    auto spare = std::make_unique<HandsFrame>();
+    HandsFrame shown;
+    std::string verb;
+    double value = 0.0;
+    while (std::cin >> verb >> value) {
+        if (verb == "delay") interpolator.DelayS = value;
+        if (verb == "push") {
+            std::string hex;
+            std::cin >> hex;
+            const std::vector<std::uint8_t> data = FromHex(hex);
+            if (!Decode(data.data(), data.size(), *spare).empty()) std::abort();
+            std::cout << (interpolator.Push(spare, value) ? 1 : 0) << "\n";
+        }
+        if (verb == "show") {
+            float weight = 0.0F;
+            if (!interpolator.Sample(value, shown, weight)) {
+                std::cout << "none\n";
+                continue;
+            }
+            const HandFrame& hand = shown.Hand(Side::Left);
+            std::cout << Number(static_cast<double>(weight)) << " " << shown.Seq;
+            for (const float x : {hand.Wrist[0], hand.Wrist[5], hand.Wrist[6], hand.Angles[3], hand.Joints[7 * 25],
+                                  shown.Bodies[0].Pose[0]})
+                std::cout << " " << Number(static_cast<double>(x));
+            std::cout << "\n";
+        }
+    }
+}
+
+void Axes() {
+    float pose[7];
+    while (std::cin >> pose[0] >> pose[1] >> pose[2] >> pose[3] >> pose[4] >> pose[5] >> pose[6]) {
+        const UnrealPose p = ToUnreal(pose);
+        for (const double x : {p.X, p.Y, p.Z, p.QX, p.QY, p.QZ, p.QW}) std::cout << Number(x) << " ";
+        std::cout << "\n";
+    }
+}
+
+/// Show at 90 Hz until standard input ends; a line of figures for every line read.
+int Live(const std::string& address) {
+    std::string host;
+    std::uint16_t port = 0;
+    const std::string error = ParseAddress(address, host, port);
+    if (!error.empty()) {
+        std::cerr << error << "\n";
+        return 2;
+    }
+    std::atomic<int> asked{0};
+    std::atomic<bool> ended{false};
+    std::thread asking([&] {
+        std::string line;
+        while (std::getline(std::cin, line)) ++asked;
+        ended = true;
+    });
+    {
+        Client client(host, port, {}, 0.05);
+        HandsFrame shown;
+        long shows = 0;
+        for (int answered = 0; !ended;) {
+            float weight = 0.0F;
+            if (client.Sample(LocalNow(), shown, weight)) ++shows;
+            std::this_thread::sleep_for(std::chrono::milliseconds(11));
+            if (answered == asked) continue;
+            ++answered;
+            const long allocations = Allocations;
+            const Stats s = client.GetStats();
+            std::ostringstream out;
+            out << "{\"state\":" << Quote(s.State) << ",\"received\":" << s.Received << ",\"lost\":" << s.Lost
+                << ",\"late\":" << s.Late << ",\"refused\":" << s.Refused << ",\"connections\":" << s.Connections
+                << ",\"rate_hz\":" << Number(s.RateHz) << ",\"age_s\":" << (s.AgeS < 0 ? "null" : Number(s.AgeS))
+                << ",\"shown_seq\":" << shown.Seq << ",\"session\":" << Quote(shown.Session.Text)
+                << ",\"shows\":" << shows << ",\"allocations\":" << allocations << "}";
+            std::cout << out.str() << std::endl;
+            Allocations = 0;  // what answering costs does not count
+        }
+    }
+    asking.join();
+    std::cout << "closed" << std::endl;
+    return 0;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+    ++Allocations;
+    if (void* memory = std::malloc(size)) return memory;
+    std::abort();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+int main(int count, char** words) {
+    const std::string verb = count > 1 ? words[1] : "";
+    if (verb == "decode") {
+        for (int i = 2; i < count; ++i) DecodeFile(words[i]);
+    } else if (verb == "interpolate") {
+        Interpolate();
+    } else if (verb == "axes") {
+        Axes();
+    } else if (verb == "live" && count == 3) {
+        return Live(words[2]);
+    } else {
+        return 2;
+    }
+    return 0;
+}

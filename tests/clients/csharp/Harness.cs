@@ -1,0 +1,169 @@
+using System;
+using System.Globalization;
+using System.IO;
+using System.Linq;
+using System.Text;
+using System.Threading;
+using ManipNet.Client;
+
+/// <summary>Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS`, in text lines.</summary>
+static class Harness
+{
+    static int Main(string[] args)
+    {
+        CultureInfo.DefaultThreadCurrentCulture = CultureInfo.InvariantCulture;
+        Thread.CurrentThread.CurrentCulture = CultureInfo.InvariantCulture;
+        Console.OutputEncoding = new UTF8Encoding(false);
+        switch (args[0])
+        {
+            case "decode":
+                for (int i = 1; i < args.Length; i++) Console.WriteLine(Decode(File.ReadAllBytes(args[i])));
+                return 0;
+            case "interpolate":
+                Interpolate();
+                return 0;
+            case "axes":
+                Axes();
+                return 0;
+            case "live":
+                Live(args[1]);
+                return 0;
+        }
+        return 2;
+    }
+
+    static string Decode(byte[] data)
+    {
+        var frame = new HandsFrame();
+        string error = HandsDecoder.Decode(data, 0, data.Length, frame);
+        if (error != null) return "{\"error\":" + Quote(error) + "}";
+        var text = new StringBuilder();
+        text.Append("{\"session\":" + Quote(frame.Session.Text) + ",\"actor\":" + Quote(frame.Actor.Text));
+        text.Append(",\"seq\":" + frame.Seq + ",\"t_capture\":" + Number(frame.TCapture));
+        text.Append(",\"t_publish\":" + Number(frame.TPublish) + ",\"look_ahead\":" + Number(frame.LookAhead));
+        text.Append(",\"latency_ms\":" + Floats(frame.LatencyMs) + ",\"hands\":{");
+        string comma = "";
+        foreach (Side side in new[] { Side.Left, Side.Right })
+        {
+            HandFrame hand = frame.Hand(side);
+            if (!hand.Present) continue;
+            text.Append(comma + Quote(side.ToString().ToLowerInvariant()) + ":{\"state\":" + Quote(Layout.States[(int)hand.State]));
+            text.Append(",\"object\":" + (hand.HasObject ? Quote(hand.Object.Text) : "null") + ",\"scale\":" + Number(hand.Scale));
+            text.Append(",\"angles\":" + Floats(hand.Angles) + ",\"rotations\":" + Floats(hand.Rotations));
+            text.Append(",\"wrist\":" + Floats(hand.Wrist) + ",\"joints\":" + Floats(hand.Joints) + "}");
+            comma = ",";
+        }
+        text.Append("},\"bodies\":[");
+        for (int i = 0; i < frame.BodyCount; i++)
+        {
+            BodyFrame body = frame.Body(i);
+            text.Append((i > 0 ? "," : "") + "{\"name\":" + Quote(body.Name.Text) + ",\"tracked\":" + (body.Tracked ? "true" : "false"));
+            text.Append(",\"pose\":" + Floats(body.Pose) + "}");
+        }
+        return text.Append("]}").ToString();
+    }
+
+    /// <summary>Obeys `delay S`, `push ARRIVAL HEX` and `show NOW` from standard input.</summary>
+    static void Interpolate()
+    {
+        var interpolator = new Interpolator();
+        HandsFrame spare = new HandsFrame(), shown = new HandsFrame();
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            string[] word = line.Split(' ');
+            double value = double.Parse(word[1], CultureInfo.InvariantCulture);
+            if (word[0] == "delay") interpolator.DelayS = value;
+            if (word[0] == "push")
+            {
+                byte[] data = FromHex(word[2]);
+                string error = HandsDecoder.Decode(data, 0, data.Length, spare);
+                if (error != null) throw new InvalidDataException(error);
+                bool taken;
+                spare = interpolator.Push(spare, value, out taken);
+                Console.WriteLine(taken ? "1" : "0");
+            }
+            if (word[0] == "show")
+            {
+                float weight;
+                bool any = interpolator.Sample(value, shown, out weight);
+                HandFrame hand = shown.Left;
+                Console.WriteLine(!any ? "none" : string.Join(" ", new[]
+                {
+                    Number(weight), shown.Seq.ToString(), Number(hand.Wrist[0]), Number(hand.Wrist[5]), Number(hand.Wrist[6]),
+                    Number(hand.Angles[3]), Number(hand.Joints[7 * 25]), Number(shown.Body(0).Pose[0]),
+                }));
+            }
+        }
+    }
+
+    static void Axes()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            float[] pose = Array.ConvertAll(line.Split(' '), word => float.Parse(word, CultureInfo.InvariantCulture));
+            Vec3 p = UnityAxes.Position(pose, 0);
+            Quat q = UnityAxes.Rotation(pose, 3);
+            Console.WriteLine(string.Join(" ", new[] { p.X, p.Y, p.Z, q.X, q.Y, q.Z, q.W }.Select(x => Number(x))));
+        }
+    }
+
+    static byte[] FromHex(string hex)
+    {
+        var data = new byte[hex.Length / 2];
+        for (int i = 0; i < data.Length; i++) data[i] = Convert.ToByte(hex.Substring(2 * i, 2), 16);
+        return data;
+    }
+
+    /// <summary>Show at 90 Hz until standard input ends; a line of figures for every line read.</summary>
+    static void Live(string address)
+    {
+        var shown = new HandsFrame();
+        using (var client = new ManipNetClient(address, null, 0.05))
+        {
+            bool ended = false;
+            int asked = 0;
+            var asking = new Thread(() =>
+            {
+                while (Console.ReadLine() != null) Interlocked.Increment(ref asked);
+                ended = true;
+            }) { IsBackground = true };
+            asking.Start();
+            int answered = 0, collections = GC.CollectionCount(0);
+            long shows = 0;
+            while (!Volatile.Read(ref ended))
+            {
+                float weight;
+                if (client.Sample(LocalClock.Now, shown, out weight)) shows++;
+                Thread.Sleep(11);
+                if (answered == Volatile.Read(ref asked)) continue;
+                answered++;
+                Stats stats = client.GetStats();
+                Console.WriteLine("{{\"state\":{0},\"received\":{1},\"lost\":{2},\"late\":{3},\"refused\":{4},\"connections\":{5},\"rate_hz\":{6},\"age_s\":{7},\"shown_seq\":{8},\"session\":{9},\"shows\":{10},\"collections\":{11},\"memory\":{12}}}",
+                    Quote(stats.State), stats.Received, stats.Lost, stats.Late, stats.Refused, stats.Connections, Number(stats.RateHz),
+                    double.IsInfinity(stats.AgeS) ? "null" : Number(stats.AgeS), shown.Seq, Quote(shown.Session.Text), shows,
+                    GC.CollectionCount(0) - collections, GC.GetTotalMemory(false));
+                Console.Out.Flush();
+            }
+        }
+        Console.WriteLine("closed");
+    }
+
+    static string Floats(float[] values)
+    {
+        var parts = new string[values.Length];
+        for (int i = 0; i < values.Length; i++) parts[i] = values[i].ToString("G9", CultureInfo.InvariantCulture);
+        return "[" + string.Join(",", parts) + "]";
+    }
+
+    static string Number(double value)
+    {
+        return value.ToString("G17", CultureInfo.InvariantCulture);
+    }
+
+    static string Quote(string text)
+    {
+        return "\"" + text.Replace("\\", "\\\\").Replace("\"", "\\\"") + "\"";
+    }
+}

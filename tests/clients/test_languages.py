@@ -1,0 +1,156 @@
+"""C#, C++ and JavaScript agree with Python: golden vectors to the byte, interpolation, axes, and a live server."""
+
+import json
+import os
+import signal
+
+import numpy as np
+import pytest
+from languages import NAMES, LiveClient, build, run
+from manipnet_client import Client, Interpolator, decode
+from publisher import message
+from support import VECTORS, publishing
+from test_axes import POSES, assert_joints
+
+from manipnet.streams.wire import encode_binary
+
+EXPECTED = json.loads((VECTORS / "expected.json").read_text(encoding="utf-8"))
+BROKEN = sorted(VECTORS.glob("bad_*.bin"))
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def command(request, tmp_path_factory):
+    return build(request.param, tmp_path_factory.mktemp(request.param))
+
+
+def test_reads_the_golden_vectors(command):
+    lines = run(command, "decode", *(str(VECTORS / f"{name}.bin") for name in EXPECTED))
+    for name, line in zip(EXPECTED, lines, strict=True):
+        assert _as_f32(json.loads(line)) == EXPECTED[name], name
+
+
+def _as_f32(value):
+    """Printed floats back to the very bits they stand for."""
+    if isinstance(value, dict):
+        exact = ("t_capture", "t_publish", "look_ahead", "seq")
+        return {k: v if k in exact else _as_f32(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_as_f32(v) for v in value]
+    return float(np.float32(value)) if isinstance(value, float | int) and not isinstance(value, bool) else value
+
+
+def test_refuses_broken_vectors_and_names_both_versions(command):
+    lines = run(command, "decode", *map(str, BROKEN))
+    errors = {path.stem: json.loads(line)["error"] for path, line in zip(BROKEN, lines, strict=True)}
+    assert "version 2" in errors["bad_version_2"]
+    assert "version 1" in errors["bad_version_2"]
+
+
+def _script(rng):
+    """A rough ride: jitter, losses, a gap, a stall with its backlog, a looping take, a new session."""
+    plan = [("s", k, k / 60) for k in range(300) if rng.random() > 0.05 and not 150 <= k < 200]
+    plan += [("s", 300 + k, k / 60) for k in range(90)] + [("t", k, 50 + k / 60) for k in range(90)]
+    events, start = [], 0.0
+    for session, seq, t_capture in plan:
+        start = {("s", True): 0.0, ("s", False): 5.2, ("t", True): 6.8}[(session, seq < 300)] - (
+            50 if session == "t" else 0
+        )
+        arrival = start + t_capture + rng.uniform(0, 0.02)
+        if session == "s" and 240 <= seq < 270:
+            arrival = start + 4.5  # half a second of backlog at once
+        payload = encode_binary(message(seq, t_capture, np.sin(3 * t_capture), session))
+        events.append((arrival, "push", payload))
+    return sorted(events + [(t, "show", b"") for t in np.arange(0.0, 9.0, 1 / 75)], key=lambda e: e[0])
+
+
+def _row(shown):
+    """What a harness prints of a shown frame."""
+    if shown is None:
+        return "none"
+    left, bodies = shown.hands.left, shown.hands.bodies
+    values = [*left.wrist[[0, 5, 6]], left.angles[3], left.joints[25, 0], bodies[0].pose[0]]
+    return [shown.weight, shown.hands.seq, *values]
+
+
+def test_interpolates_as_python_does(command):
+    events = _script(np.random.default_rng(5))
+    text = "delay 0.06\n" + "".join(f"{verb} {float(t)!r} {data.hex()}".strip() + "\n" for t, verb, data in events)
+    reference, want = Interpolator(0.06), []
+    for t, verb, data in events:
+        if verb == "push":
+            want.append([float(reference.push(decode(data), t))])
+        else:
+            want.append(_row(reference.sample(t)))
+    lines = run(command, "interpolate", text=text)
+    assert len(lines) == len(want)
+    for line, values in zip(lines, want, strict=True):
+        if values == "none":
+            assert line == "none"
+        else:
+            np.testing.assert_allclose([float(x) for x in line.split()], values, atol=2e-6)
+
+
+def test_axes_keep_joint_angles(command):
+    engine = {"mono": "unity", "gcc": "unreal", "clang": "unreal"}.get(os.path.basename(command[0]))
+    if engine is None:
+        pytest.skip("the web client shows the project's own axes")
+    poses = [pose[part]["project"] for pose in POSES for part in ("parent", "child")]
+    lines = run(command, "axes", text="".join(" ".join(map(str, p)) + "\n" for p in poses))
+    converted = {tuple(p): [float(x) for x in line.split()] for p, line in zip(poses, lines, strict=True)}
+    assert_joints(engine, lambda pose: converted[tuple(pose.tolist())])
+
+
+@pytest.fixture
+def live(command):
+    clients = []
+
+    def start(tcp, websocket):
+        clients.append(LiveClient.start(command, websocket if "node" in command[0] else tcp))
+        return clients[-1]
+
+    yield start
+    for client in clients:
+        client.kill()
+
+
+def test_live_server_killed_and_restarted(live):
+    with publishing("--session", "a") as (process, tcp, websocket):
+        client = live(tcp, websocket)
+        figures = client.ask_until(lambda f: f["received"] > 60)
+        assert (figures["lost"], figures["refused"], figures["connections"]) == (0, 0, 1)
+        process.kill()
+        process.wait()
+        ports = [address.rpartition(":")[2] for address in (tcp, websocket)]
+        with publishing("--session", "b", "--port", ports[0], "--websocket-port", ports[1]):
+            figures = client.ask_until(lambda f: f["session"] == "b")
+        assert (figures["lost"], figures["connections"]) == (0, 2)
+    assert client.close() == ("closed", 0)
+
+
+def test_nothing_is_allocated_per_frame(live):
+    with publishing() as (_, tcp, websocket):
+        client = live(tcp, websocket)
+        start = client.ask_until(lambda f: f["received"] > 30)
+        end = client.ask_until(lambda f: f["received"] > start["received"] + 90)
+        if "allocations" in end:
+            assert end["allocations"] == 0
+        elif "collections" in end:
+            assert end["collections"] == start["collections"] == 0
+        else:
+            pytest.skip("JavaScript does not tell what it allocates")
+
+
+def test_a_client_stopped_resumes_with_the_newest(live):
+    with publishing() as (_, tcp, websocket), Client(tcp) as other:
+        client = live(tcp, websocket)
+        before = client.ask_until(lambda f: f["shown_seq"] > 30)
+        os.kill(client.process.pid, signal.SIGSTOP)
+        hands = other.newest
+        while hands.seq < before["shown_seq"] + 90:
+            hands = other.wait(after=hands, timeout_s=10)
+        os.kill(client.process.pid, signal.SIGCONT)
+        seen = []
+        while not seen or seen[-1] < hands.seq - 5:
+            seen.append(client.ask()["shown_seq"])
+    # What it held, then what is new: nothing of the backlog in between.
+    assert all(s <= before["shown_seq"] + 20 or s >= hands.seq - 20 for s in seen), seen

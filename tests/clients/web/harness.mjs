@@ -1,0 +1,71 @@
+// Runs the web client for the tests: `decode FILES`, `interpolate`, `live ADDRESS`. Talks in text lines.
+import { readFileSync } from "node:fs";
+import { createInterface } from "node:readline";
+import { decode, HandsFrame, Interpolator, ManipNetClient } from "../../../clients/web/manipnet.js";
+
+const [verb, ...words] = process.argv.slice(2);
+const lines = () => createInterface({ input: process.stdin });
+const exact = (bytes) => bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
+
+function describe(buffer) {
+  const frame = new HandsFrame();
+  try {
+    decode(buffer, frame);
+  } catch (error) {
+    return { error: error.message };
+  }
+  const { session, actor, seq } = frame;
+  const hands = {};
+  for (const side of ["left", "right"]) {
+    const { present, ...hand } = frame[side];
+    if (!present) continue;
+    for (const field of ["angles", "rotations", "wrist", "joints"]) hand[field] = [...hand[field]];
+    hands[side] = hand;
+  }
+  const bodies = frame.bodies.slice(0, frame.bodyCount).map((b) => ({ ...b, pose: [...b.pose] }));
+  const times = { t_capture: frame.tCapture, t_publish: frame.tPublish, look_ahead: frame.lookAhead };
+  return { session, actor, seq, ...times, latency_ms: [...frame.latencyMs], hands, bodies };
+}
+
+async function interpolate() {
+  const interpolator = new Interpolator();
+  let spare = new HandsFrame();
+  for await (const line of lines()) {
+    const [what, value, data] = line.split(" ");
+    if (what === "delay") interpolator.delayS = Number(value);
+    if (what === "push") {
+      decode(exact(Buffer.from(data, "hex")), spare);
+      const next = interpolator.push(spare, Number(value));
+      console.log(next === spare ? 0 : 1);
+      spare = next;
+    }
+    if (what === "show") {
+      if (!interpolator.sample(Number(value))) {
+        console.log("none");
+        continue;
+      }
+      const { left, seq, bodies } = interpolator.output;
+      const values = [left.wrist[0], left.wrist[5], left.wrist[6], left.angles[3], left.joints[7 * 25], bodies[0].pose[0]];
+      console.log(interpolator.weight, seq, ...values);
+    }
+  }
+}
+
+async function live(address) {
+  const client = new ManipNetClient(address, { delayS: 0.05 });
+  let shows = 0;
+  const showing = setInterval(() => client.sample() && shows++, 11);
+  for await (const _ of lines()) {
+    const { rateHz, ageS, ...stats } = client.stats();
+    const shown = { shown_seq: client.hands.seq, session: client.hands.session };
+    console.log(JSON.stringify({ ...stats, rate_hz: rateHz, age_s: ageS, ...shown, shows }));
+  }
+  clearInterval(showing);
+  client.close();
+  console.log("closed");
+}
+
+if (verb === "decode") for (const path of words) console.log(JSON.stringify(describe(exact(readFileSync(path)))));
+else if (verb === "interpolate") await interpolate();
+else if (verb === "live") await live(words[0]);
+else process.exit(2);
