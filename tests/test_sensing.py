@@ -139,7 +139,7 @@ def test_features_agree_with_the_slow_version(body, hands):
             expected = np.reshape(slow[name], block.shape)
             if name == "ambient":
                 # the field rounds a cube's edges, so a few cells that barely touch may differ
-                assert np.mean(np.abs(fast - expected) > 0.03) < 0.02
+                assert np.mean(np.abs(fast - expected) > 0.03) < 0.03
                 assert np.corrcoef(fast.ravel(), expected.ravel())[0, 1] > 0.98
             elif name == "surface_normals":
                 # a joint near an inner ridge of the distance has no one direction
