@@ -46,6 +46,10 @@ def build_parser() -> argparse.ArgumentParser:
     what.add_argument(
         "--mesh", action="append", default=[], metavar="NAME=FILE", help="the body NAME carries this mesh; repeatable"
     )
+    what.add_argument("--natnet", metavar="SERVER[:1510]", help="also connect to OptiTrack Motive on that machine")
+    what.add_argument("--multicast", action="store_true", help="Motive streams by multicast")
+    what.add_argument("--interface", metavar="ADDRESS", help="address of the network card that faces Motive")
+    what.add_argument("--up", choices=("y", "z"), help="the axis that Motive streams as up (default: y)")
     how = parser.add_argument_group("how fingers are made")
     _option(how, "model", str, "NAME", "a shipped model, or the folder of one")
     _option(how, "look_ahead", float, "SECONDS", "future to wait for, 0 … 0.5; what is missing is forecast")
@@ -80,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     terminal = Terminal()
     logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
     try:
-        server = Server(_configure(arguments), terminal.say)
+        server = Server(configure(arguments), terminal.say)
         server.run(stop.is_set)
     except (ConfigError, BundleError, MeshError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
@@ -104,11 +108,11 @@ def _option(group: Any, name: str, kind: type, metavar: str, text: str) -> None:
     )
 
 
-def _configure(arguments: argparse.Namespace):
+def configure(arguments: argparse.Namespace):
     """Defaults, then the rig file's `[server]`, then the command line. Raises `ConfigError`."""
     from manipnet.config import ConfigError, ServerConfig, default_actor, parse_endpoint, parse_object
     from manipnet.rig import load_rig
-    from manipnet.streams import livelink_json, vmc
+    from manipnet.streams import livelink_json, natnet, vmc
 
     objects = tuple(parse_object(text) for text in arguments.mesh)
     if arguments.rig is not None and (objects or arguments.demo):
@@ -121,7 +125,11 @@ def _configure(arguments: argparse.Namespace):
     options |= {name: value for name, value in vars(arguments).items() if value is not None and value is not False}
     if "look_ahead" in options:
         options["look_ahead_s"] = float(options["look_ahead"])
-    for name, port in (("vmc", vmc.DEFAULT_PORT), ("livelink", livelink_json.DEFAULT_PORT)):
+    for name, port in (
+        ("natnet", natnet.COMMAND_PORT),
+        ("vmc", vmc.DEFAULT_PORT),
+        ("livelink", livelink_json.DEFAULT_PORT),
+    ):
         if name in options:
             options[name] = parse_endpoint(options[name], port)
     known = {field.name for field in fields(ServerConfig)}

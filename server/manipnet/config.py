@@ -3,7 +3,7 @@
 import ipaddress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 from manipnet.geometry import Array
 from manipnet.network.bundle import DEFAULT_MODEL
@@ -65,6 +65,11 @@ class ServerConfig:
     osc_port: int = 39540
     page_port: int = 8080
     metrics_port: int | None = None
+    natnet: tuple[str, int] | None = None
+    """Motive to connect to; the three below are about it."""
+    multicast: bool = False
+    interface: str | None = None
+    up: Literal["y", "z"] = "y"
     vmc: tuple[str, int] | None = None
     livelink: tuple[str, int] | None = None
     model: str = DEFAULT_MODEL

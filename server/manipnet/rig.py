@@ -24,6 +24,10 @@ SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
     "osc_port": (int,),
     "page_port": (int,),
     "metrics_port": (int,),
+    "natnet": (str,),
+    "multicast": (bool,),
+    "interface": (str,),
+    "up": (str,),
     "vmc": (str,),
     "livelink": (str,),
     "model": (str,),
@@ -31,6 +35,7 @@ SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
 }
 """What the table `[server]` may hold: the command line's options of these names, which win over it."""
 
+_KINDS = {str: "text", int: "an integer", float: "a number", bool: "true or false"}
 _ACTOR_KEYS = ("bodies", "objects", "hand_scale")
 _OFFSET_KEYS = ("body", "position", "rotation")
 
@@ -78,10 +83,8 @@ class _Reader:
         for key, value in server.items():
             at = ("server", key)
             self._typed(value, SERVER_KEYS[key], at)
-            if key.endswith("port") and not 0 <= value < 65536:
-                self._fail(at, f"is {value}; allowed are 0 (any free one) … 65535")
-            if key == "look_ahead" and not 0.0 <= value <= MAX_LOOK_AHEAD_S:
-                self._fail(at, f"is {value}; allowed are 0 … {MAX_LOOK_AHEAD_S} s")
+            if allowed := _wrong(key, value):
+                self._fail(at, f"is {value!r}; allowed are {allowed}")
         return Rig(actors, server)
 
     def _actor(self, table: dict[str, Any], at: tuple) -> ActorConfig:
@@ -149,10 +152,10 @@ class _Reader:
         return value if good else self._fail(at, f"must be tables [[{at[-1]}]], not {_show(value)}")
 
     def _typed(self, value: Any, kinds: tuple[type, ...], at: tuple, allowed: str = "") -> Any:
-        allowed = allowed or " or ".join({str: "text", int: "an integer", float: "a number"}[kind] for kind in kinds)
+        allowed = allowed or " or ".join(_KINDS[kind] for kind in kinds)
         if value is None:
             self._fail(at, f"is missing; it must be {allowed}")
-        if not isinstance(value, kinds) or isinstance(value, bool):
+        if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
             self._fail(at, f"is {_show(value)}; it must be {allowed}")
         return value
 
@@ -166,6 +169,15 @@ class _Reader:
         dotted = "".join(f"[{key + 1}]" if isinstance(key, int) else f".{key}" for key in at).lstrip(".")
         where = f"{self._path}:{line}" if line else f"{self._path}"
         raise ConfigError(f"{where}: {dotted} {text}")
+
+
+def _wrong(key: str, value: Any) -> str:
+    """What is allowed for a key of `[server]`, if this value is not."""
+    if key.endswith("port") and not 0 <= value < 65536:
+        return "0 (any free one) … 65535"
+    if key == "look_ahead" and not 0.0 <= value <= MAX_LOOK_AHEAD_S:
+        return f"0 … {MAX_LOOK_AHEAD_S} s"
+    return "y, z" if key == "up" and value not in ("y", "z") else ""
 
 
 def _show(value: Any) -> str:

@@ -21,7 +21,8 @@ from manipnet.props import Wardrobe
 from manipnet.publisher import Publisher
 from manipnet.requests import Requests
 from manipnet.status import SilenceWatch, second_line
-from manipnet.streams.intake import ListenError
+from manipnet.streams.intake import ListenError, Sink
+from manipnet.streams.natnet_client import NatNetBodies
 from manipnet.streams.osc import OscBodies
 from manipnet.streams.zmq_bodies import ZmqBodies
 from manipnet.synthesis import Synthesizer
@@ -108,6 +109,8 @@ class Server:
             "osc": osc,
             "page": publisher.addresses["page"],
         }
+        if config.natnet is not None:
+            addresses["natnet"] = self._listen(opened, "--natnet", _motive(config, sink, self.counters))
         if config.metrics_port is not None:
             metrics = MetricsPage(host, config.metrics_port, self.counters, self.timings)
             opened.callback(metrics.close)
@@ -131,3 +134,11 @@ class Server:
         self._say(second_line(self._actors, self.counters, self.timings, shown - self._shown))
         self._shown = shown
         self._watch.look(self._actors, now_s)
+
+
+def _motive(config: ServerConfig, sink: Sink, counters: Counters) -> NatNetBodies:
+    assert config.natnet is not None
+    host, port = config.natnet
+    return NatNetBodies(
+        sink, counters, host, port, multicast=config.multicast, interface=config.interface, up=config.up
+    )
