@@ -16,6 +16,7 @@ from manipnet.streams.osc_packet import (
     MAX_DATAGRAM_BYTES,
     MAX_DEPTH,
     MAX_MESSAGES,
+    check_address,
     read_address,
     read_arguments,
     split_packet,
@@ -32,8 +33,8 @@ def message(address, value):
 
 
 def read(message):
-    address, offset = read_address(message)
-    return address, read_arguments(message, offset)
+    raw, offset = read_address(message)
+    return check_address(raw), read_arguments(message, offset)
 
 
 @pytest.mark.parametrize(

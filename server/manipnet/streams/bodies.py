@@ -21,6 +21,8 @@ MAX_TIME_S = 1e10
 """Seconds up to the year 2286: a time beyond it was sent in milliseconds or nanoseconds."""
 
 _FLOATS = {float}
+_FAR = MAX_COORDINATE_M
+_SMALLEST, _LARGEST = 1e-12, 1e12  # a quaternion's squared length; beyond, it says nothing about a rotation
 
 FAULTS = ("nan", "bounds", "zero_quaternion")
 """Why a pose is unusable: a number is not finite, a position is outside any stage, no rotation is given."""
@@ -67,9 +69,7 @@ def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
         raise MessageError(f"message is {_kind(message)}; it must be a map with the keys t, frame and bodies")
     t_s = _number(message, "t", "message")
     if not abs(t_s) <= MAX_TIME_S:
-        raise MessageError(
-            f"t is {t_s}; it must be seconds, finite, at most {MAX_TIME_S:g} (no milliseconds)"
-        )
+        raise MessageError(f"t is {t_s}; it must be seconds, finite, at most {MAX_TIME_S:g} (no milliseconds)")
     frame = message.get("frame")
     if frame is not None and not _is_int(frame, 63):
         raise MessageError(f"frame is {_show(frame)}; it must be an integer of at most 63 bits")
@@ -87,16 +87,16 @@ def make_sample(
     id: int | None, name: str | None, p: tuple[float, ...], q: tuple[float, ...], tracked: bool
 ) -> BodySample:
     """A sample with a unit quaternion from three and four floats, or an untracked one with its fault."""
-    fault = _fault(p, q)
-    if fault is None:
-        px, py, pz = p
-        x, y, z, w = q
-        n = 1.0 / math.hypot(x, y, z, w)
+    px, py, pz = p
+    x, y, z, w = q
+    squared = x * x + y * y + z * z + w * w
+    # Comparisons with NaN are false: one chain of them finds every fault.
+    if _SMALLEST < squared < _LARGEST and -_FAR <= px <= _FAR and -_FAR <= py <= _FAR and -_FAR <= pz <= _FAR:
+        n = 1.0 / math.sqrt(squared)
         return BodySample(id, name, (px, py, pz), (x * n, y * n, z * n, w * n), tracked)
     # A lost body is often sent as zeros or NaN: saying "lost" is no fault, claiming "tracked" with it is.
-    return BodySample(
-        id, name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), tracked=False, fault=fault if tracked else None
-    )
+    fault = _fault(p, q) if tracked else None
+    return BodySample(id, name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), tracked=False, fault=fault)
 
 
 def check_distinct(bodies: tuple[BodySample, ...]) -> None:
@@ -145,12 +145,10 @@ def _body(entry: object, where: str) -> BodySample:
     return make_sample(id, name, _numbers(entry, "p", 3, where), _numbers(entry, "q", 4, where), tracked)
 
 
-def _fault(p: tuple[float, ...], q: tuple[float, ...]) -> str | None:
-    if not math.isfinite(sum(p) + sum(q)):  # one sum costs less than seven tests; overflow is no pose either
+def _fault(p: tuple[float, ...], q: tuple[float, ...]) -> str:
+    if not all(map(math.isfinite, (*p, *q))):
         return "nan"
-    if not -MAX_COORDINATE_M <= min(p) <= max(p) <= MAX_COORDINATE_M:
-        return "bounds"
-    return None if 1e-6 < math.hypot(*q) < math.inf else "zero_quaternion"
+    return "bounds" if max(map(abs, p)) > MAX_COORDINATE_M else "zero_quaternion"
 
 
 def _numbers(entry: Mapping[str, Any], key: str, count: int, where: str) -> tuple[float, ...]:

@@ -9,21 +9,20 @@
 """
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from manipnet.streams.bodies import MAX_TIME_S, MessageError, check_name
-from manipnet.streams.osc_packet import Argument, read_address, read_arguments
+from manipnet.streams.osc_packet import Argument, check_address, read_address, read_arguments
 
 BodyKey = int | str
 Numbers = tuple[float, ...]
 
 _FIELD_SIZES = {"position": 3, "quat": 4, "tracked": 1, "transformation": 7}
-_KIND_SIZES = {"frame": 1, "device": 7, "tracker": 3}
+_FLOATS = {float}
 
 
-@dataclass(frozen=True, slots=True)
-class Route:
+class Route(NamedTuple):
     """What a message says: a field of a body, or of the frame (`start`, `end`, `timestamp`)."""
 
     body: BodyKey
@@ -33,67 +32,71 @@ class Route:
 
 def read_route(message: bytes) -> Route | None:
     """The meaning of one OSC message, None when it is not for us; raises `MessageError`."""
-    address, offset = read_address(message)
-    place = _look_up(address)
+    raw, offset = read_address(message)
+    place = _look_up(raw)
+    arguments = read_arguments(message, offset)
     if place is None:
         return None
-    kind, body, name = place
-    arguments = read_arguments(message, offset)
+    kind, body, name, count = place
     if kind == "in arguments":  # /rigidbody <body> <field> …
         if len(arguments) < 2 or arguments[1] not in _FIELD_SIZES:
             return None
-        body, name, arguments = _body_key(arguments[0], address), str(arguments[1]), arguments[2:]
+        name = str(arguments[1])
+        body, count, arguments = _body_key(arguments[0], raw), _FIELD_SIZES[name], arguments[2:]
     elif kind == "device":
         if not arguments:
-            raise MessageError(f"{address} has no arguments; a serial and 7 numbers are expected")
-        body, arguments = _body_key(arguments[0], address), arguments[1:]
-    values = _numbers(arguments, _KIND_SIZES.get(kind) or _FIELD_SIZES[name], address)
+            raise MessageError(f"{raw.decode()} has no arguments; a serial and 7 numbers are expected")
+        body, arguments = _body_key(arguments[0], raw), arguments[1:]
+    values = _numbers(arguments, count, raw)
     if kind == "device":
         values = _from_unity(values)
+    elif kind == "tracker" and name == "position":
+        values = (-values[0], values[1], values[2])
     elif kind == "tracker":
-        if name == "position":
-            values = (-values[0], values[1], values[2])
-        else:
-            name, values = "quat", unity_euler_to_quat(*values)
+        name, values = "quat", unity_euler_to_quat(*values)
     elif kind == "frame" and not abs(values[0]) <= 1e3 * MAX_TIME_S:
-        raise MessageError(f"{address} is {values[0]}; it must be finite, at most {1e3 * MAX_TIME_S:g}")
+        raise MessageError(f"{raw.decode()} is {values[0]}; it must be finite, at most {1e3 * MAX_TIME_S:g}")
     return Route(body, name, values)
 
 
 @lru_cache(maxsize=1024)
-def _look_up(address: str) -> tuple[str, BodyKey, str] | None:
-    """`(kind, body, field)` of an exact address; None for one that is not ours."""
-    match address.split("/")[1:]:
+def _look_up(raw: bytes) -> tuple[str, BodyKey, str, int] | None:
+    """`(kind, body, field, how many numbers)` of an exact address; None for one that is not ours."""
+    match check_address(raw).split("/")[1:]:
         case ["rigidbody", body, str(name)] if name in _FIELD_SIZES:
-            return "body", _body_key(body, address), name
+            return "body", _body_key(body, raw), name, _FIELD_SIZES[name]
         case ["rigidbody"]:
-            return "in arguments", "", ""
+            return "in arguments", "", "", 0
         case ["frame", "start" | "end" | "timestamp" as name]:
-            return "frame", "", name
+            return "frame", "", name, 1
         case ["VMC", "Ext", "Tra" | "Con" | "Hmd", "Pos"]:
-            return "device", "", "transformation"
+            return "device", "", "transformation", 7
         case ["VMC", "Ext", "Tra" | "Con" | "Hmd", "Pos", "Local"]:
-            return "device", "", "local"
+            return "device", "", "local", 7
         case ["tracking", "trackers", body, "position" | "rotation" as name]:
-            return "tracker", _body_key(body, address), name
+            return "tracker", _body_key(body, raw), name, 3
     return None
 
 
-def _body_key(text: Argument, address: str) -> BodyKey:
+def _body_key(text: Argument, raw_address: bytes) -> BodyKey:
     """A body's id when it is written in digits, else its name."""
     if isinstance(text, str):
         if not (text.isascii() and text.isdigit()):
-            return check_name(text, f"body in {address}")
+            return check_name(text, f"body in {raw_address.decode()}")
         text = int(text[:11])
     if type(text) is not int or not -(2**31) <= text < 2**31:
-        raise MessageError(f"body in {address} is {text!r}; it must be a name or an integer of at most 31 bits")
+        raise MessageError(
+            f"body in {raw_address.decode()} is {text!r}; it must be a name or an integer of at most 31 bits"
+        )
     return text
 
 
-def _numbers(arguments: tuple[Argument, ...], count: int, address: str) -> Numbers:
+def _numbers(arguments: tuple[Argument, ...], count: int, raw_address: bytes) -> Numbers:
+    if len(arguments) == count and {*map(type, arguments)} == _FLOATS:
+        return arguments  # type: ignore[return-value]
     values = tuple(float(value) for value in arguments if isinstance(value, int | float))
     if not len(values) == len(arguments) == count:
-        raise MessageError(f"{address} has {len(arguments)} arguments; {count} numbers are expected")
+        raise MessageError(f"{raw_address.decode()} has {len(arguments)} arguments; {count} numbers are expected")
     return values
 
 

@@ -6,12 +6,13 @@ of stack on deep nesting, lets decoding errors escape and treats `*` in an addre
 
 import struct
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import islice
 
 from manipnet.streams.bodies import MessageError
 
-MAX_DATAGRAM_BYTES = 32_768
-MAX_MESSAGES = 1_024
+MAX_DATAGRAM_BYTES = 24_576
+MAX_MESSAGES = 256
 MAX_DEPTH = 4
 MAX_ADDRESS_BYTES = 256
 MAX_ARGUMENTS = 64
@@ -23,6 +24,7 @@ Argument = int | float | str | bytes | bool | None
 _BUNDLE = b"#bundle\0"
 _STRUCT_OF = {"i": "i", "f": "f", "h": "q", "d": "d", "t": "Q", "r": "I", "c": "I", "m": "I"}
 _CONSTANTS: dict[str, Argument] = {"T": True, "F": False, "N": None, "I": True}
+_NUMBERS = frozenset(b"ifhd")
 _PATTERN = frozenset("*?[]{}")
 
 
@@ -46,9 +48,7 @@ def _elements(data: bytes, time_tag: int, depth: int) -> Iterator[tuple[int, byt
         yield time_tag, data
         return
     if data[:8] != _BUNDLE or len(data) < 16:
-        raise MessageError(
-            f"OSC element begins with {data[:8]!r}; it must be '/' or '#bundle' and a time tag"
-        )
+        raise MessageError(f"OSC element begins with {data[:8]!r}; it must be '/' or '#bundle' and a time tag")
     if depth == MAX_DEPTH:
         raise MessageError(f"bundles are nested deeper than {MAX_DEPTH}")
     own_tag = int.from_bytes(data[8:16], "big")
@@ -63,24 +63,44 @@ def _elements(data: bytes, time_tag: int, depth: int) -> Iterator[tuple[int, byt
         position += size
 
 
-def read_address(message: bytes) -> tuple[str, int]:
-    """The address and the offset of what follows it; raises `MessageError`."""
-    address, offset = _read_text(message, 0, "address")
-    if len(address) > MAX_ADDRESS_BYTES or not address.isprintable() or not _PATTERN.isdisjoint(address):
+def read_address(message: bytes) -> tuple[bytes, int]:
+    """The raw address and the offset of what follows it; raises `MessageError`. See `check_address`."""
+    end, after = _text_end(message, 0, "address")
+    return message[:end], after
+
+
+def check_address(raw: bytes) -> str:
+    """The text of an address that may be looked up; raises `MessageError`."""
+    address = _decode(raw, "address")
+    if len(raw) > MAX_ADDRESS_BYTES or not address.isprintable() or not _PATTERN.isdisjoint(address):
         allowed = f"at most {MAX_ADDRESS_BYTES} printable characters, no pattern"
         raise MessageError(f"OSC address is {address[:40]!r}; {allowed}")
-    return address, offset
+    return address
 
 
 def read_arguments(message: bytes, offset: int) -> tuple[Argument, ...]:
     """Arguments from the offset `read_address` gave; raises `MessageError`."""
     if offset == len(message):
         return ()  # old senders leave out the type tags of a message without arguments
-    tags, offset = _read_text(message, offset, "type tags")
+    end, after = _text_end(message, offset, "type tags")
+    tags = message[offset:end]
+    layout = _numbers_layout(tags)
+    if layout is not None and after + layout.size == len(message):
+        return layout.unpack_from(message, after)
+    return _read_any(_decode(tags, "type tags"), message, after)
+
+
+@lru_cache(maxsize=64)
+def _numbers_layout(tags: bytes) -> struct.Struct | None:
+    """How to read arguments that are all plain numbers, as poses are; None for others."""
+    if tags[:1] != b"," or len(tags) > MAX_ARGUMENTS + 1 or not _NUMBERS.issuperset(tags[1:]):
+        return None
+    return struct.Struct(">" + "".join(_STRUCT_OF[tag] for tag in tags[1:].decode()))
+
+
+def _read_any(tags: str, message: bytes, offset: int) -> tuple[Argument, ...]:
     if not tags.startswith(",") or len(tags) > MAX_ARGUMENTS + 1:
-        raise MessageError(
-            f"OSC type tags are {tags[:20]!r}; ',' and at most {MAX_ARGUMENTS} types are allowed"
-        )
+        raise MessageError(f"OSC type tags are {tags[:20]!r}; ',' and at most {MAX_ARGUMENTS} types are allowed")
     arguments: list[Argument] = []
     for tag in tags[1:]:
         if tag in _STRUCT_OF:
@@ -90,8 +110,9 @@ def read_arguments(message: bytes, offset: int) -> tuple[Argument, ...]:
             arguments += struct.unpack_from(">" + _STRUCT_OF[tag], message, offset)
             offset += size
         elif tag in "sS":
-            text, offset = _read_text(message, offset, "text argument")
-            arguments.append(text)
+            end, after = _text_end(message, offset, "text argument")
+            arguments.append(_decode(message[offset:end], "text argument"))
+            offset = after
         elif tag == "b":
             blob, offset = _read_blob(message, offset)
             arguments.append(blob)
@@ -109,13 +130,18 @@ def time_tag_to_s(time_tag: int) -> float:
     return (time_tag >> 32) - NTP_TO_UNIX_S + (time_tag & 0xFFFFFFFF) / 2**32
 
 
-def _read_text(message: bytes, offset: int, what: str) -> tuple[str, int]:
+def _text_end(message: bytes, offset: int, what: str) -> tuple[int, int]:
+    """Where the text at `offset` ends, and where what follows its zeros begins."""
     end = message.find(b"\0", offset)
     after = (end & ~3) + 4
-    if end < 0 or after > len(message) or any(message[end:after]):
+    if end < 0 or after > len(message) or message[end:after].strip(b"\0"):
         raise MessageError(f"OSC {what} is not ended by one to four zero bytes")
+    return end, after
+
+
+def _decode(text: bytes, what: str) -> str:
     try:
-        return message[offset:end].decode("utf-8"), after
+        return text.decode("utf-8")
     except UnicodeDecodeError:
         raise MessageError(f"OSC {what} is not UTF-8 text") from None
 
