@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from manipnet.geometry import matrix_to_quat
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.hand.skeleton import DOF_COUNT, DOF_NAMES, JOINT_NAMES
 from manipnet.streams.bodies import MAX_BODIES
 from manipnet.streams.wire.schema import (
     BODY,
@@ -45,6 +47,13 @@ OPENXR_JOINTS = (
 JOINT_PARENTS = (1, -1, 1, 2, 3, 4, *(p for f in range(4) for p in (1, *range(6 + 5 * f, 10 + 5 * f))))
 """Parent of each OpenXR joint, as WebXR and Live Link order them: everything hangs on the wrist."""
 
+_zero_positions, _zero_matrices = forward_kinematics(np.zeros(DOF_COUNT))
+ZERO_POSE = {
+    "zero_positions": _zero_positions.round(8) + 0.0,
+    "zero_rotations": matrix_to_quat(_zero_matrices).round(8) + 0.0,
+}
+"""A right hand with all angles zero, in its wrist frame: joints `(22, 3)` and bone rotations `(17, 4)`."""
+
 NAMES = {
     "states": STATES,
     "joint_names": OPENXR_JOINTS,
@@ -78,6 +87,9 @@ def python_layout() -> str:
     for name, words in {**NAMES, "joint_parents": JOINT_PARENTS}.items():
         body = "".join(f"    {json.dumps(word)},\n" for word in words)
         lines += [f"{name.upper()} = (\n{body})"]
+    for name, table in ZERO_POSE.items():
+        body = "".join(f"        {json.dumps(row.tolist())},\n" for row in table)
+        lines += [f"{name.upper()} = np.array(\n    [\n{body}    ]\n)"]
     for record, dtype in RECORDS.items():
         lines += ["", f"{record.upper()} = np.dtype(", "    {", f'        "itemsize": {dtype.itemsize},']
         fields = [(name, *_python_format(dtype[name]), _offset(dtype, name)) for name in dtype.names]
@@ -109,6 +121,9 @@ def csharp_layout() -> str:
         lines += [f'            "{word}",' for word in words] + ["        };"]
     lines += ["        public static readonly int[] JointParents =", "        {"]
     lines += [f"            {', '.join(map(str, JOINT_PARENTS))}", "        };"]
+    for name, table in ZERO_POSE.items():
+        lines += [f"        public static readonly float[] {_pascal(name)} =", "        {"]
+        lines += [f"            {', '.join(f'{x}f' for x in row)}," for row in table.tolist()] + ["        };"]
     return "\n".join([*lines, "    }", "}"]) + "\n"
 
 

@@ -25,6 +25,12 @@ static class Harness
             case "axes":
                 Axes();
                 return 0;
+            case "retarget":
+                Retarget();
+                return 0;
+            case "names":
+                Names();
+                return 0;
             case "live":
                 Live(args[1]);
                 return 0;
@@ -106,6 +112,50 @@ static class Harness
             Vec3 p = UnityAxes.Position(pose, 0);
             Quat q = UnityAxes.Rotation(pose, 3);
             Console.WriteLine(string.Join(" ", new[] { p.X, p.Y, p.Z, q.X, q.Y, q.Z, q.W }.Select(x => Number(x))));
+        }
+    }
+
+    /// <summary>From a line of side, 15 poses and 5 tips, and one of a message in hex, the 15 rotations and the hand's.</summary>
+    static void Retarget()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            float[] x = Array.ConvertAll(line.Split(' '), word => float.Parse(word, CultureInfo.InvariantCulture));
+            var positions = new Vec3[HandRig.BoneCount];
+            var rotations = new Quat[HandRig.BoneCount];
+            for (int i = 0; i < HandRig.BoneCount; i++)
+            {
+                positions[i] = new Vec3(x[7 * i + 1], x[7 * i + 2], x[7 * i + 3]);
+                rotations[i] = new Quat(x[7 * i + 4], x[7 * i + 5], x[7 * i + 6], x[7 * i + 7]);
+            }
+            Vec3[] tips = Enumerable.Range(0, 5).Select(i => new Vec3(x[106 + 3 * i], x[107 + 3 * i], x[108 + 3 * i])).ToArray();
+            var rig = new HandRig((Side)x[0], positions, rotations, tips);
+            byte[] data = FromHex(Console.ReadLine());
+            var frame = new HandsFrame();
+            HandsDecoder.Decode(data, 0, data.Length, frame);
+            rig.Solve(frame.Hand((Side)x[0]), rotations);
+            foreach (Quat q in rotations.Concat(new[] { rig.HandRotation(frame.Hand((Side)x[0])) }))
+                Console.Write(string.Join(" ", new[] { q.X, q.Y, q.Z, q.W }.Select(v => Number(v))) + " ");
+            Console.WriteLine();
+        }
+    }
+
+    /// <summary>For every bone name read: which bone it means, as side, finger and part.</summary>
+    static void Names()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            string found = "none";
+            foreach (Side side in new[] { Side.Left, Side.Right })
+            {
+                if (RigNames.IsHand(line, side)) found = side + " hand";
+                for (int finger = 0; finger < 5; finger++)
+                    for (int part = 0; part < 3; part++)
+                        if (RigNames.Matches(line, side, finger, part)) found = side + " " + finger + " " + part;
+            }
+            Console.WriteLine(found);
         }
     }
 

@@ -1,0 +1,93 @@
+using System;
+
+namespace ManipNet.Client
+{
+    /// <summary>
+    /// Poses the finger bones of any rig. The rig's bones may have any axes and lengths: what counts is where they point
+    /// in the bind pose. All is in the space of the rig's hand bone, Unity axes.
+    /// </summary>
+    public sealed class HandRig
+    {
+        public const int BoneCount = 15;
+        public static readonly string[] Fingers = { "Thumb", "Index", "Middle", "Ring", "Little" };
+        public static readonly string[] Parts = { "Proximal", "Intermediate", "Distal" };
+        const int Index = 3, Middle = 6, Little = 12;
+        const int IndexJoint = 5, MiddleJoint = 8, LittleJoint = 14;
+        static readonly int[] Parents = { -1, 0, 1, 2, 3, 0, 5, 6, 0, 8, 9, 0, 11, 12, 0, 14, 15 };
+        readonly Quat[] _world = new Quat[Layout.BoneCount];
+        readonly Quat[] _bind = new Quat[BoneCount];
+        readonly Quat _wristToHand;
+
+        /// <param name="side">Which hand the rig's is.</param>
+        /// <param name="positions">15 bind positions, thumb to little finger, proximal to distal.</param>
+        /// <param name="rotations">15 bind rotations in the same order.</param>
+        /// <param name="tips">5 finger tips in the bind pose.</param>
+        /// <param name="correctRestPose">Turn each bone so that it points where ours does, whatever the bind pose is.</param>
+        public HandRig(Side side, Vec3[] positions, Quat[] rotations, Vec3[] tips, bool correctRestPose = true)
+        {
+            _wristToHand = Frame(positions[Middle], positions[Index] - positions[Little])
+                * Frame(ZeroPosition(side, MiddleJoint), ZeroPosition(side, IndexJoint) - ZeroPosition(side, LittleJoint)).Inverse;
+            for (int i = 0; i < BoneCount; i++)
+            {
+                Vec3 end = i % 3 == 2 ? tips[i / 3] : positions[i + 1];
+                Vec3 ours = ZeroPosition(side, JointAfter(i)) - ZeroPosition(side, OurBone(i));
+                Quat turn = correctRestPose ? Quat.FromTo(end - positions[i], _wristToHand.Rotate(ours)) : Quat.Identity;
+                _bind[i] = ZeroRotation(side, OurBone(i)).Inverse * _wristToHand.Inverse * turn * rotations[i];
+            }
+        }
+
+        /// <summary>The rotation of the rig's hand bone that puts it where the tracked wrist is.</summary>
+        public Quat HandRotation(HandFrame hand)
+        {
+            return UnityAxes.Rotation(hand.Wrist, 3) * _wristToHand.Inverse;
+        }
+
+        /// <summary>Rotations of the 15 finger bones in the space of the rig's hand bone.</summary>
+        public void Solve(HandFrame hand, Quat[] output)
+        {
+            _world[0] = _wristToHand;
+            for (int i = 1; i < Layout.BoneCount; i++)
+                _world[i] = _world[Parents[i]] * UnityAxes.Rotation(hand.Rotations, 4 * i);
+            for (int i = 0; i < BoneCount; i++) output[i] = (_world[OurBone(i)] * _bind[i]).Normalized;
+        }
+
+        /// <summary>
+        /// Our two carpal thumb angles multiply into what Unity calls ThumbProximal, so thumbs start one bone later.
+        /// </summary>
+        static int OurBone(int i)
+        {
+            return 2 + i;
+        }
+
+        /// <summary>The joint at the end of a bone: the next bone, or the finger's tip.</summary>
+        static int JointAfter(int i)
+        {
+            return i % 3 == 2 ? Layout.BoneCount + i / 3 : OurBone(i) + 1;
+        }
+
+        /// <summary>The stored pose is a right hand in the project frame; Unity's axes mirror it, and so is a left hand.</summary>
+        static Vec3 ZeroPosition(Side side, int joint)
+        {
+            float[] p = Layout.ZeroPositions;
+            int at = 3 * joint;
+            return side == Side.Right ? UnityAxes.Position(p, at) : new Vec3(p[at], p[at + 1], p[at + 2]);
+        }
+
+        static Quat ZeroRotation(Side side, int bone)
+        {
+            float[] q = Layout.ZeroRotations;
+            int at = 4 * bone;
+            return side == Side.Right ? UnityAxes.Rotation(q, at) : new Quat(q[at], q[at + 1], q[at + 2], q[at + 3]);
+        }
+
+        /// <summary>The orientation with x along the hand and y toward `across`.</summary>
+        static Quat Frame(Vec3 along, Vec3 across)
+        {
+            Quat first = Quat.FromTo(new Vec3(1f, 0f, 0f), along);
+            Vec3 wanted = across - Vec3.Dot(across, along.Normalized) * along.Normalized;
+            Vec3 local = first.Inverse.Rotate(wanted);
+            float angle = (float)Math.Atan2(local.Z, local.Y);
+            return first * new Quat((float)Math.Sin(0.5f * angle), 0f, 0f, (float)Math.Cos(0.5f * angle));
+        }
+    }
+}

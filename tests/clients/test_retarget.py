@@ -1,0 +1,132 @@
+"""Any rig's finger bones point where ours do, in Python (right-handed) and in C# (Unity's axes)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from languages import build, run
+from make_vectors import messages
+from manipnet_client import decode
+from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, matches
+
+from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.hand.skeleton import DOF_LIMITS_RAD, PARENTS
+from manipnet.streams.axes import to_unity
+from manipnet.streams.wire import encode_binary
+
+ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
+
+
+def posed(side, rng):
+    """A message with one random hand, and where its bones point in the wrist frame `(15, 3)`."""
+    angles = rng.uniform(*DOF_LIMITS_RAD.T)
+    positions, matrices = forward_kinematics(angles)
+    world = matrix_to_quat(matrices)
+    local = world.copy()
+    local[1:] = quat_multiply(quat_conjugate(world[PARENTS[1:17]]), world[1:])
+    along = positions[ENDS] - positions[BONES]
+    if side == "left":
+        local, along = mirror_quats(local), along * [-1, 1, 1]
+    live = messages()["live"]
+    hand = replace(live.hands[side], rotations=local)
+    return replace(live, hands={side: hand}), along / np.linalg.norm(along, axis=1, keepdims=True)
+
+
+def foreign_rig(side, rng, mirrored):
+    """A bind pose of other proportions, bent a little, its hand bone and bone axes turned at random.
+
+    Returns positions, rotations, tips in the rig's hand space, and the turn from our wrist frame to it.
+    """
+    positions, _ = forward_kinematics(rng.uniform(-0.2, 0.3, 20))
+    positions = 1.3 * positions
+    positions[[5, 8, 14]] = 1.3 * forward_kinematics(np.zeros(20))[0][[5, 8, 14]]  # knuckles: they define the hand
+    if (side == "left") != mirrored:
+        positions = positions * [-1, 1, 1]
+    turn = quat_exp(rng.normal(size=3))
+    positions = quat_rotate(turn, positions)
+    rotations = np.array([quat_exp(x) for x in rng.normal(size=(15, 3))])
+    return positions[BONES], rotations, positions[17:], turn
+
+
+def shown_directions(positions, rotations, tips, posed_rotations):
+    """Where the rig's bones point once posed: their bind direction carried by what turned them."""
+    ends = np.array([tips[i // 3] if i % 3 == 2 else positions[i + 1] for i in range(15)])
+    bind = ends - positions
+    turned = quat_rotate(quat_multiply(posed_rotations, quat_conjugate(rotations)), bind)
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("seed", range(3))
+def test_python_rig_points_where_the_hand_does(side, seed):
+    rng = np.random.default_rng(seed)
+    message, along = posed(side, rng)
+    positions, rotations, tips, turn = foreign_rig(side, rng, mirrored=False)
+    hand = decode(encode_binary(message)).hand(side)
+    rig = HandRig(side, positions, rotations, tips)
+    shown = shown_directions(positions, rotations, tips, rig.solve(hand))
+    np.testing.assert_allclose(shown, quat_rotate(turn, along), atol=1e-5)
+    wrist = quat_multiply(rig.hand_rotation(hand), turn)
+    assert abs(wrist @ hand.wrist[3:]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_csharp_rig_points_where_the_hand_does(tmp_path):
+    command = build("csharp", tmp_path)
+    rng, lines, checks = np.random.default_rng(1), [], []
+    for side in ("left", "right"):
+        message, along = posed(side, rng)
+        positions, rotations, tips, turn = foreign_rig(side, rng, mirrored=True)
+        numbers = np.hstack([positions, rotations]).ravel().tolist() + tips.ravel().tolist()
+        lines += [" ".join(map(str, [int(side == "right"), *numbers])), encode_binary(message).hex()]
+        checks.append((message.hands[side], along * [-1, 1, 1], positions, rotations, tips, turn))
+    for line, (hand, along, positions, rotations, tips, turn) in zip(
+        run(command, "retarget", text="\n".join(lines) + "\n"), checks, strict=True
+    ):
+        out = np.array([float(x) for x in line.split()]).reshape(16, 4)
+        shown = shown_directions(positions, rotations, tips, out[:15])
+        np.testing.assert_allclose(shown, quat_rotate(turn, along), atol=1e-4)
+        assert abs(quat_multiply(out[15], turn) @ to_unity(hand.wrist)[3:]) == pytest.approx(1.0, abs=1e-5)
+
+
+BONE_NAMES = {
+    "LeftIndexProximal": ("left", 1, 0),
+    "RightThumbDistal": ("right", 0, 2),
+    "mixamorig:LeftHandPinky3": ("left", 4, 2),
+    "RightHandThumb1": ("right", 0, 0),
+    "index_02_r": ("right", 1, 1),
+    "pinky_01_l": ("left", 4, 0),
+    "f_ring.03.L": ("left", 3, 2),
+    "thumb.01.R": ("right", 0, 0),
+    "J_Bip_R_Little2": ("right", 4, 1),
+    "LeftHand": ("left", None, None),
+    "mixamorig:RightHand": ("right", None, None),
+    "hand_l": ("left", None, None),
+    "hand.R": ("right", None, None),
+    "LeftForeArm": None,
+    "index_metacarpal_l": None,
+}
+
+
+def test_bone_names_in_python():
+    for name, meaning in BONE_NAMES.items():
+        found = [(s, None, None) for s in ("left", "right") if is_hand(name, s)]
+        found += [
+            (s, f, p)
+            for s in ("left", "right")
+            for f in range(len(FINGERS))
+            for p in range(len(PARTS))
+            if matches(name, s, f, p)
+        ]
+        assert found == ([meaning] if meaning else []), name
+
+
+def test_bone_names_in_csharp(tmp_path):
+    lines = run(build("csharp", tmp_path), "names", text="".join(f"{name}\n" for name in BONE_NAMES))
+    for line, (name, meaning) in zip(lines, BONE_NAMES.items(), strict=True):
+        if meaning is None:
+            assert line == "none", name
+        else:
+            side, finger, part = meaning
+            expected = f"{side.capitalize()} " + ("hand" if finger is None else f"{finger} {part}")
+            assert line == expected, name
