@@ -51,7 +51,7 @@ class HandRig:
         world[0] = self.wrist_to_hand
         for bone in range(1, 17):
             world[bone] = multiply(world[_PARENTS[bone]], hand.rotations[bone])
-        out = np.array([multiply(world[bone], bind) for bone, bind in zip(BONES, self._bind)])
+        out = np.array([multiply(world[bone], bind) for bone, bind in zip(BONES, self._bind, strict=True)])
         return out / np.linalg.norm(out, axis=1, keepdims=True)
 
 
@@ -65,11 +65,8 @@ def matches(bone: str, side: str, finger: int, part: int) -> bool:
     if name == f"{side}{FINGERS[finger]}{PARTS[part]}".lower():
         return True
     words = (FINGERS[finger].lower(), "pinky")[: 2 if finger == 4 else 1]
-    return any(
-        name
-        in (f"{side}hand{f}{number}", f"{f}0{number}{letter}", f"f{f}0{number}{letter}", f"jbip{letter}{f}{number}")
-        for f in words
-    )
+    patterns = (f"{side}hand%s{number}", f"%s0{number}{letter}", f"f%s0{number}{letter}", f"jbip{letter}%s{number}")
+    return any(name == pattern % word for pattern in patterns for word in words)
 
 
 def is_hand(bone: str, side: str) -> bool:
