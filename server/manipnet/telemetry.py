@@ -48,6 +48,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "frames_dropped": ("reason", DROP_REASONS),
     "bodies_rejected": ("reason", BODY_REASONS),
     "sender_restarts": ("source", SOURCES),
+    "connections_refused": ("reason", ("handshake", "not_listed")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),

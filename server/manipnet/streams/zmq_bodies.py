@@ -8,8 +8,10 @@ import time
 import zmq
 
 from manipnet.streams.bodies import MAX_MESSAGE_BYTES, MessageError, parse_bodies
+from manipnet.streams.curve import Gatekeeper
 from manipnet.streams.guard import SourceGuard
 from manipnet.streams.intake import Intake, ListenError, Sink
+from manipnet.streams.keys import ServerKeys
 from manipnet.telemetry import Counters
 
 HIGH_WATER_MARK = 64
@@ -20,32 +22,49 @@ HEARTBEAT_TIMEOUT_MS = 3_000
 
 
 class ZmqBodies:
-    """Receives body messages on `tcp://host:port`; port 0 takes a free one, see `address` after `start`."""
+    """Receives body messages on `tcp://host:port`; port 0 takes a free one, see `address` after `start`.
 
-    def __init__(self, sink: Sink, counters: Counters, host: str = "127.0.0.1", port: int = 5556) -> None:
+    With `keys`, connections are encrypted and only clients on the list may send.
+    """
+
+    def __init__(
+        self,
+        sink: Sink,
+        counters: Counters,
+        host: str = "127.0.0.1",
+        port: int = 5556,
+        keys: ServerKeys | None = None,
+    ) -> None:
         self._intake = Intake("zmq", sink, counters)
+        self._counters, self._keys = counters, keys
         self._guard = SourceGuard()
         self._endpoint, self._ipv6 = zmq_endpoint(host, port)
         self._context: zmq.Context | None = None
+        self._gatekeeper: Gatekeeper | None = None
         self._thread: threading.Thread | None = None
         self.address = self._endpoint
 
     def start(self) -> None:
         """Bind and begin to receive; raises `ListenError` when the address cannot be bound."""
-        self._context = zmq.Context()
-        subscriber = self._context.socket(zmq.SUB)
+        context = zmq.Context()
+        subscriber = context.socket(zmq.SUB)
         harden(subscriber, self._ipv6)
         subscriber.subscribe(b"")
+        if self._keys is not None:
+            self._gatekeeper = Gatekeeper(context, self._keys, self._counters)
+            self._gatekeeper.secure(subscriber)
+            self._gatekeeper.start()
         try:
             subscriber.bind(self._endpoint)
         except zmq.ZMQError as error:
             subscriber.close()
-            self._context.term()
+            context.term()
             raise ListenError(
                 f"cannot listen for bodies on {self._endpoint}: {zmq.strerror(error.errno or 0)}; "
                 "choose a free port (0 takes any) and an address of this machine"
             ) from None
         self.address = subscriber.getsockopt_string(zmq.LAST_ENDPOINT)
+        self._context = context
         # The socket changes hands here, once, and belongs to the thread from now on.
         self._thread = threading.Thread(target=self._run, args=(subscriber,), name="zmq-bodies", daemon=True)
         self._thread.start()
@@ -56,7 +75,9 @@ class ZmqBodies:
             return
         self._context.term()  # wakes the thread with ContextTerminated and waits until it closed its socket
         self._thread.join()
-        self._thread = self._context = None
+        if self._gatekeeper is not None:
+            self._gatekeeper.join()
+        self._thread = self._context = self._gatekeeper = None
 
     def _run(self, subscriber: zmq.Socket) -> None:
         with subscriber:
@@ -66,9 +87,7 @@ class ZmqBodies:
                     part = subscriber.recv(copy=False)
                 except zmq.ContextTerminated:
                     return
-                if (
-                    part.more or skipping
-                ):  # every part of a multipart message passes here, only its last counts
+                if part.more or skipping:  # every part of a multipart message passes here, only its last counts
                     skipping = part.more
                     if not skipping:
                         self._intake.drop("malformed", _source(part), "a message of several frames; send one")
@@ -100,9 +119,7 @@ def zmq_endpoint(host: str, port: int) -> tuple[str, bool]:
         try:
             address = ipaddress.ip_address(socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][4][0])
         except (OSError, UnicodeError) as error:
-            raise ListenError(
-                f"cannot listen on host {host!r}: {error}; use an address of this machine"
-            ) from None
+            raise ListenError(f"cannot listen on host {host!r}: {error}; use an address of this machine") from None
     is_v6 = address.version == 6
     return (f"tcp://[{address}]:{port}" if is_v6 else f"tcp://{address}:{port}"), is_v6
 
