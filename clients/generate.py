@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from manipnet.geometry import matrix_to_quat
+from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES, OPENXR_PARENTS, webxr_name
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.hand.skeleton import DOF_COUNT, DOF_NAMES, JOINT_NAMES
 from manipnet.streams.bodies import MAX_BODIES
@@ -37,16 +38,6 @@ NUMBERS = {
     "joint_count": HAND["joints"].shape[0],
     "rate_hz": 60,
 }
-FINGERS = ("index", "middle", "ring", "little")
-OPENXR_JOINTS = (
-    "palm",
-    "wrist",
-    *(f"thumb_{part}" for part in ("metacarpal", "proximal", "distal", "tip")),
-    *(f"{f}_{part}" for f in FINGERS for part in ("metacarpal", "proximal", "intermediate", "distal", "tip")),
-)
-JOINT_PARENTS = (1, -1, 1, 2, 3, 4, *(p for f in range(4) for p in (1, *range(6 + 5 * f, 10 + 5 * f))))
-"""Parent of each OpenXR joint, as WebXR and Live Link order them: everything hangs on the wrist."""
-
 _zero_positions, _zero_matrices = forward_kinematics(np.zeros(DOF_COUNT))
 ZERO_POSE = {
     "zero_positions": _zero_positions.round(8) + 0.0,
@@ -56,7 +47,7 @@ ZERO_POSE = {
 
 NAMES = {
     "states": STATES,
-    "joint_names": OPENXR_JOINTS,
+    "joint_names": OPENXR_JOINT_NAMES,
     "bone_names": JOINT_NAMES[: NUMBERS["bone_count"]],
     "angle_names": DOF_NAMES,
 }
@@ -84,7 +75,7 @@ def python_layout() -> str:
     lines = [f'"""{NOTE}"""', "", "import numpy as np", ""]
     lines += [f"{name.upper()} = {value}" for name, value in NUMBERS.items()]
     lines += [f'TOPIC = b"{TOPIC_BIN.decode()}"']
-    for name, words in {**NAMES, "joint_parents": JOINT_PARENTS}.items():
+    for name, words in {**NAMES, "joint_parents": OPENXR_PARENTS}.items():
         body = "".join(f"    {json.dumps(word)},\n" for word in words)
         lines += [f"{name.upper()} = (\n{body})"]
     for name, table in ZERO_POSE.items():
@@ -120,7 +111,7 @@ def csharp_layout() -> str:
         lines += [f"        public static readonly string[] {_pascal(name)} =", "        {"]
         lines += [f'            "{word}",' for word in words] + ["        };"]
     lines += ["        public static readonly int[] JointParents =", "        {"]
-    lines += [f"            {', '.join(map(str, JOINT_PARENTS))}", "        };"]
+    lines += [f"            {', '.join(map(str, OPENXR_PARENTS))}", "        };"]
     for name, table in ZERO_POSE.items():
         lines += [f"        public static readonly float[] {_pascal(name)} =", "        {"]
         lines += [f"            {', '.join(f'{x}f' for x in row)}," for row in table.tolist()] + ["        };"]
@@ -134,7 +125,7 @@ def cpp_layout() -> str:
     for name, words in NAMES.items():
         lines += [f"inline constexpr const char* k{_pascal(name)}[] = {{"]
         lines += [f'    "{word}",' for word in words] + ["};"]
-    parents = ", ".join(map(str, JOINT_PARENTS))
+    parents = ", ".join(map(str, OPENXR_PARENTS))
     lines += [f"inline constexpr int kJointParents[] = {{\n    {parents}}};"]
     return "\n".join([*lines, "", "}  // namespace manipnet::layout"]) + "\n"
 
@@ -142,19 +133,10 @@ def cpp_layout() -> str:
 def javascript_layout() -> str:
     lines = [f"// {NOTE}"]
     lines += [f"export const {name.upper()} = {value};" for name, value in constants().items()]
-    webxr = [_webxr(name) for name in OPENXR_JOINTS]
-    for name, words in {**NAMES, "joint_names": webxr, "joint_parents": JOINT_PARENTS}.items():
+    webxr = [webxr_name(name) for name in OPENXR_JOINT_NAMES]
+    for name, words in {**NAMES, "joint_names": webxr, "joint_parents": OPENXR_PARENTS}.items():
         lines += [f"export const {name.upper()} = {json.dumps(words)};"]
     return "\n".join(lines) + "\n"
-
-
-def _webxr(joint: str) -> str:
-    """OpenXR's name of a joint as WebXR spells it; WebXR itself has no palm."""
-    finger, _, part = joint.partition("_")
-    if finger != "thumb" and part:
-        finger = f"{finger.replace('little', 'pinky')}-finger"
-    phalanx = "phalanx-" if part in ("proximal", "intermediate", "distal") else ""
-    return f"{finger}-{phalanx}{part}" if part else joint
 
 
 def files() -> dict[Path, str]:

@@ -4,10 +4,10 @@ import json
 import socket
 
 import numpy as np
-from generate import JOINT_PARENTS, OPENXR_JOINTS
 from make_vectors import messages
 
 from manipnet.geometry import compose
+from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 from manipnet.streams import livelink_json
 from manipnet.streams.axes import to_unreal
 
@@ -19,14 +19,14 @@ def test_bones_are_as_the_sample_receiver_expects():
     assert subject == "ManipNet_a_left"
     assert not rest
     assert [bone["Name"] for bone in bones[:2]] == ["wrist", "palm"]
-    assert {bone["Name"] for bone in bones} == set(OPENXR_JOINTS)
+    assert {bone["Name"] for bone in bones} == set(OPENXR_JOINT_NAMES)
     for i, bone in enumerate(bones):
         assert -1 <= bone["Parent"] < i
         assert [len(bone[key]) for key in ("Location", "Rotation", "Scale")] == [3, 4, 3]
     by_name = {bone["Name"]: bone for bone in bones}
-    for name, parent in zip(OPENXR_JOINTS, JOINT_PARENTS, strict=True):
+    for name, parent in zip(OPENXR_JOINT_NAMES, OPENXR_PARENTS, strict=True):
         index = by_name[name]["Parent"]
-        assert (bones[index]["Name"] if index >= 0 else None) == (OPENXR_JOINTS[parent] if parent >= 0 else None)
+        assert (bones[index]["Name"] if index >= 0 else None) == (OPENXR_JOINT_NAMES[parent] if parent >= 0 else None)
 
 
 def test_local_poses_compose_to_the_world():
