@@ -1,0 +1,89 @@
+using System;
+using UnityEngine;
+
+namespace ManipNet.Client.Unity
+{
+    /// <summary>
+    /// Receives hands while it is enabled, on a thread of its own, and makes the pose to show once per frame, before the
+    /// components that use it.
+    /// </summary>
+    [AddComponentMenu("ManipNet/ManipNet Receiver")]
+    [DefaultExecutionOrder(-100)]
+    public sealed class ManipNetReceiver : MonoBehaviour
+    {
+        [Tooltip("As the server's `ready` line tells it.")]
+        [SerializeField] string address = "tcp://127.0.0.1:5555";
+
+        [Tooltip("Whose hands; empty for the first seen.")]
+        [SerializeField] string actor = "";
+
+        [Tooltip("Seconds behind the newest frame, to bridge jitter and losses. 0.05 will do on one machine.")]
+        [SerializeField, Range(0f, 0.5f)] float delay = 0.1f;
+
+        readonly HandsFrame _hands = new HandsFrame();
+        ManipNetClient _client;
+        float _weight;
+
+        /// <summary>The pose to show this frame, in the project's axes (right-handed): see ManipNetPose.</summary>
+        public HandsFrame Hands
+        {
+            get { return _hands; }
+        }
+
+        public bool HasHands { get; private set; }
+
+        /// <summary>Falls from 1 to 0 when the stream is lost.</summary>
+        public float Weight
+        {
+            get { return _weight; }
+        }
+
+        public Stats Stats
+        {
+            get { return _client == null ? new Stats { State = "off" } : _client.GetStats(); }
+        }
+
+        public string Address
+        {
+            get { return address; }
+            set
+            {
+                address = value;
+                if (_client == null) return;
+                OnDisable();
+                OnEnable();
+            }
+        }
+
+        void OnEnable()
+        {
+            try
+            {
+                _client = new ManipNetClient(address, actor, delay);
+            }
+            catch (ArgumentException error)
+            {
+                Debug.LogError("ManipNet: " + error.Message, this);
+                enabled = false;
+            }
+        }
+
+        /// <summary>Also called before scripts are reloaded: the thread must not outlive them.</summary>
+        void OnDisable()
+        {
+            if (_client != null) _client.Dispose();
+            _client = null;
+            HasHands = false;
+        }
+
+        void OnValidate()
+        {
+            if (_client != null) _client.DelayS = delay;
+        }
+
+        void LateUpdate()
+        {
+            HasHands = _client != null && _client.Sample(LocalClock.Now, _hands, out _weight);
+        }
+    }
+}

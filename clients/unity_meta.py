@@ -1,0 +1,33 @@
+"""Write the `.meta` file that Unity wants beside every asset of the package, each with a GUID that never changes.
+
+Run `python clients/unity_meta.py` after adding or moving a file. A GUID is made from the path, so references to a file
+survive whoever writes its meta file.
+"""
+
+import hashlib
+from pathlib import Path
+
+PACKAGE = Path(__file__).parent / "unity" / "com.manipnet.client"
+IMPORTERS = {".cs": "MonoImporter", ".asmdef": "AssemblyDefinitionImporter", ".md": "TextScriptImporter"}
+IMPORTERS |= {"package.json": "PackageManifestImporter", ".png": "TextureImporter", ".svg": "DefaultImporter"}
+
+
+def files(package: Path) -> dict[Path, str]:
+    """Every meta file with its text. A folder whose name ends in ~ is invisible to Unity, what is in it is not."""
+    assets = [path for path in sorted(package.rglob("*")) if path.suffix != ".meta" and not path.name.endswith("~")]
+    return {path.with_name(path.name + ".meta"): _meta(path, package) for path in assets}
+
+
+def _meta(asset: Path, package: Path) -> str:
+    guid = hashlib.md5(f"com.manipnet.client/{asset.relative_to(package).as_posix()}".encode()).hexdigest()
+    folder = "folderAsset: yes\n" if asset.is_dir() else ""
+    importer = "DefaultImporter" if asset.is_dir() else IMPORTERS.get(asset.name) or IMPORTERS[asset.suffix]
+    return (
+        f"fileFormatVersion: 2\nguid: {guid}\n{folder}{importer}:\n  externalObjects: {{}}\n"
+        "  userData:\n  assetBundleName:\n  assetBundleVariant:\n"
+    )
+
+
+if __name__ == "__main__":
+    for path, text in files(PACKAGE).items():
+        path.write_text(text, encoding="utf-8", newline="\n")

@@ -1,0 +1,63 @@
+// The few types of the editor and of NUnit that the package uses: enough to compile against.
+using System;
+using UnityEngine;
+
+namespace UnityEditor
+{
+    public class EditorWindow : UnityEngine.Object
+    {
+        public static T GetWindow<T>(string title) where T : EditorWindow, new() { return new T(); }
+        public void Repaint() { }
+    }
+
+    public sealed class MenuItem : Attribute { public MenuItem(string path) { } }
+
+    public enum MessageType { Info }
+
+    public static class AssemblyReloadEvents
+    {
+        public static event Action beforeAssemblyReload { add { } remove { } }
+    }
+
+    public static class EditorGUILayout
+    {
+        public static string TextField(string label, string text) { return text; }
+        public static void LabelField(string label, string text) { }
+        public static void HelpBox(string text, MessageType type) { }
+        public static void Space() { }
+    }
+
+    public static class EditorGUI
+    {
+        public static void BeginDisabledGroup(bool disabled) { }
+        public static void EndDisabledGroup() { }
+    }
+
+    public static class EditorUtility
+    {
+        public static bool DisplayDialog(string title, string message, string ok) { return true; }
+    }
+
+    public static class Selection
+    {
+        public static GameObject activeGameObject { get { return null; } }
+    }
+
+    public static class Undo
+    {
+        public static T AddComponent<T>(GameObject to) where T : Component, new() { return to.AddComponent<T>(); }
+    }
+}
+
+namespace NUnit.Framework
+{
+    public sealed class TestAttribute : Attribute { }
+
+    public static class StringAssert
+    {
+        public static void Contains(string expected, string actual)
+        {
+            if (!actual.Contains(expected)) throw new Exception("\"" + actual + "\" does not contain \"" + expected + "\"");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+// The few types of the engine that the package uses, just working enough to run its components without Unity.
+using System;
+using System.Collections.Generic;
+using System.Linq;
+
+namespace UnityEngine
+{
+    public struct Vector3
+    {
+        public float x, y, z;
+        public Vector3(float x, float y, float z) { this.x = x; this.y = y; this.z = z; }
+        public static Vector3 one { get { return new Vector3(1, 1, 1); } }
+        public static Vector3 down { get { return new Vector3(0, -1, 0); } }
+        public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
+        public static Vector3 operator -(Vector3 a, Vector3 b) { return new Vector3(a.x - b.x, a.y - b.y, a.z - b.z); }
+        public static Vector3 operator *(float s, Vector3 v) { return new Vector3(s * v.x, s * v.y, s * v.z); }
+        public static Vector3 Lerp(Vector3 a, Vector3 b, float t) { return a + t * (b - a); }
+    }
+
+    public struct Quaternion
+    {
+        public float x, y, z, w;
+        public Quaternion(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; }
+        public static Quaternion identity { get { return new Quaternion(0, 0, 0, 1); } }
+        public static Quaternion Inverse(Quaternion q) { return new Quaternion(-q.x, -q.y, -q.z, q.w); }
+        public static Quaternion operator *(Quaternion a, Quaternion b)
+        {
+            return new Quaternion(
+                a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
+                a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
+                a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
+                a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z);
+        }
+        public static Vector3 operator *(Quaternion q, Vector3 v)
+        {
+            Quaternion r = q * new Quaternion(v.x, v.y, v.z, 0) * Inverse(q);
+            return new Vector3(r.x, r.y, r.z);
+        }
+        public static Quaternion Slerp(Quaternion a, Quaternion b, float t)
+        {
+            float s = a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0 ? -t : t;
+            var q = new Quaternion(a.x * (1 - t) + b.x * s, a.y * (1 - t) + b.y * s, a.z * (1 - t) + b.z * s, a.w * (1 - t) + b.w * s);
+            float n = (float)Math.Sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+            return new Quaternion(q.x / n, q.y / n, q.z / n, q.w / n);
+        }
+    }
+
+    public class Object
+    {
+        string _name = "";
+        public virtual string name { get { return _name; } set { _name = value; } }
+        public static GameObject Instantiate(GameObject original) { return new GameObject(original.name); }
+    }
+
+    public class Component : Object
+    {
+        public GameObject gameObject;
+        public override string name { get { return gameObject.name; } set { gameObject.name = value; } }
+        public Transform transform { get { return gameObject.transform; } }
+        public T GetComponent<T>() where T : Component { return gameObject.GetComponent<T>(); }
+        public T[] GetComponentsInChildren<T>(bool inactive) where T : Component { return transform.All().OfType<T>().ToArray(); }
+    }
+
+    public class Behaviour : Component
+    {
+        public bool enabled = true;
+        public bool isActiveAndEnabled { get { return enabled; } }
+    }
+
+    public class MonoBehaviour : Behaviour { }
+
+    public sealed class Transform : Component
+    {
+        readonly List<Transform> _children = new List<Transform>();
+        Transform _parent;
+        Vector3 _local;
+        Quaternion _turn = Quaternion.identity;
+        public Vector3 localScale;
+        public int childCount { get { return _children.Count; } }
+        public Transform GetChild(int i) { return _children[i]; }
+        public void SetParent(Transform parent, bool keepWorld) { _parent = parent; parent._children.Add(this); }
+        public IEnumerable<Transform> All() { return new[] { this }.Concat(_children.SelectMany(c => c.All())); }
+        public Vector3 position
+        {
+            get { return _parent == null ? _local : _parent.position + _parent.rotation * _local; }
+            set { _local = _parent == null ? value : Quaternion.Inverse(_parent.rotation) * (value - _parent.position); }
+        }
+        public Quaternion rotation
+        {
+            get { return _parent == null ? _turn : _parent.rotation * _turn; }
+            set { _turn = _parent == null ? value : Quaternion.Inverse(_parent.rotation) * value; }
+        }
+    }
+
+    public sealed class GameObject : Object
+    {
+        readonly List<Component> _components = new List<Component>();
+        public GameObject(string name = "") { this.name = name; AddComponent<Transform>(); }
+        public Transform transform { get { return (Transform)_components[0]; } }
+        public T GetComponent<T>() where T : Component { return _components.OfType<T>().FirstOrDefault(); }
+        public T AddComponent<T>() where T : Component, new()
+        {
+            var made = new T { gameObject = this };
+            _components.Add(made);
+            return made;
+        }
+        public static GameObject CreatePrimitive(PrimitiveType type) { return new GameObject(type.ToString()); }
+    }
+
+    public enum PrimitiveType { Sphere }
+
+    public enum HumanBodyBones { LeftHand = 17, RightHand = 18, LeftThumbProximal = 24, RightThumbProximal = 39 }
+
+    public sealed class Animator : Behaviour
+    {
+        public readonly Dictionary<HumanBodyBones, Transform> Bones = new Dictionary<HumanBodyBones, Transform>();
+        public bool isHuman { get { return Bones.Count > 0; } }
+        public Transform GetBoneTransform(HumanBodyBones bone) { Transform t; Bones.TryGetValue(bone, out t); return t; }
+    }
+
+    public static class Debug
+    {
+        public static void LogError(string message, Object about) { Console.WriteLine("error: " + message); }
+    }
+
+    public static class Resources
+    {
+        public static T[] FindObjectsOfTypeAll<T>() { return new T[0]; }
+    }
+
+    public static class GUILayout
+    {
+        public static bool Button(string text) { return false; }
+    }
+
+    [AttributeUsage(AttributeTargets.Field)] public sealed class SerializeField : Attribute { }
+    public sealed class TooltipAttribute : Attribute { public TooltipAttribute(string text) { } }
+    public sealed class RangeAttribute : Attribute { public RangeAttribute(float low, float high) { } }
+    public sealed class AddComponentMenu : Attribute { public AddComponentMenu(string path) { } }
+    public sealed class DefaultExecutionOrder : Attribute { public DefaultExecutionOrder(int order) { } }
+}
