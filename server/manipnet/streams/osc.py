@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from manipnet.streams.bodies import BodyFrame, MessageError
+from manipnet.streams.flood_filter import FloodFilter, FloodWatch
 from manipnet.streams.guard import AllowList, Network, SourceGuard
 from manipnet.streams.intake import Intake, Sink
 from manipnet.streams.osc_frames import GAP_S, FrameAssembler
@@ -12,6 +13,7 @@ from manipnet.telemetry import Counters
 
 MAX_SENDERS = 16
 IDLE_S = 0.1
+_FLOOD = "more datagrams than can be read from senders unknown so far"
 
 
 class OscBodies:
@@ -34,6 +36,7 @@ class OscBodies:
         self._host, self._port = host, port
         self._assemblers: dict[Address, FrameAssembler] = {}
         self._thread: UdpThread | None = None
+        self._flood: FloodWatch | None = None
         self.address = f"udp://{host}:{port}"
 
     def start(self) -> None:
@@ -41,6 +44,7 @@ class OscBodies:
         udp = bind_udp("OSC", self._host, self._port)
         host, port = udp.getsockname()[:2]
         self.address = f"udp://[{host}]:{port}" if ":" in host else f"udp://{host}:{port}"
+        self._flood = FloodWatch(FloodFilter(udp))
         self._thread = UdpThread(udp, self._receive, self._idle, self._lost)
         self._thread.start()
 
@@ -52,7 +56,9 @@ class OscBodies:
 
     def _receive(self, datagram: bytes, sender: Address, now_s: float) -> None:
         if not self._guard.admits(sender, now_s):
-            self._intake.drop("rate", "osc", "more datagrams than can be read from senders unknown so far")
+            self._intake.drop("rate", "osc", _FLOOD)
+            if self._flood is not None:
+                self._flood.add()
             return
         if not self._allowed(sender[0]):
             self._guard.bad(sender)
@@ -78,6 +84,8 @@ class OscBodies:
         self._assemblers[sender] = assembler
 
     def _idle(self, now_s: float) -> float:
+        if self._flood is not None:
+            self._flood.look(now_s, self._assemblers.keys())
         waiting = False
         for assembler in self._assemblers.values():
             if assembler.pending:
@@ -93,7 +101,11 @@ class OscBodies:
             self._intake.accept(frame)
 
     def _lost(self, count: int) -> None:
-        self._intake.drop("kernel", "osc", "the socket's buffer was full", count)
+        if self._flood is not None and self._flood.engaged:
+            self._flood.add(count)
+            self._intake.drop("rate", "osc", _FLOOD, count)
+        else:
+            self._intake.drop("kernel", "osc", "the socket's buffer was full", count)
 
 
 def _name(sender: Address) -> str:

@@ -19,7 +19,7 @@ Idle = Callable[[float], float]
 """Called after every datagram and when none came: does what is due, says in how many seconds again."""
 
 RECEIVE_BUFFER_BYTES = 4 << 20
-DROPS_PERIOD_S = 1.0
+DROPS_PERIOD_S = 0.2
 _SO_MEMINFO, _MEMINFO_WORDS, _MEMINFO_DROPS = 55, 9, 8
 _log = logging.getLogger(__name__)
 
