@@ -6,7 +6,7 @@ import signal
 
 import numpy as np
 import pytest
-from languages import NAMES, LiveClient, build, run
+from languages import NAMES, LiveClient, run
 from manipnet_client import Client, Interpolator, decode
 from publisher import message
 from support import VECTORS, publishing
@@ -19,8 +19,8 @@ BROKEN = sorted(VECTORS.glob("bad_*.bin"))
 
 
 @pytest.fixture(scope="module", params=NAMES)
-def command(request, tmp_path_factory):
-    return build(request.param, tmp_path_factory.mktemp(request.param))
+def command(request, harness):
+    return harness(request.param)
 
 
 def test_reads_the_golden_vectors(command):

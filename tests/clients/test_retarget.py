@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from languages import build, run
+from languages import run
 from make_vectors import messages
 from manipnet_client import decode
 from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, matches
@@ -71,8 +71,8 @@ def test_python_rig_points_where_the_hand_does(side, seed):
     assert abs(wrist @ hand.wrist[3:]) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_csharp_rig_points_where_the_hand_does(tmp_path):
-    command = build("csharp", tmp_path)
+def test_csharp_rig_points_where_the_hand_does(harness):
+    command = harness("csharp")
     rng, lines, checks = np.random.default_rng(1), [], []
     for side in ("left", "right"):
         message, along = posed(side, rng)
@@ -121,8 +121,8 @@ def test_bone_names_in_python():
         assert found == ([meaning] if meaning else []), name
 
 
-def test_bone_names_in_csharp(tmp_path):
-    lines = run(build("csharp", tmp_path), "names", text="".join(f"{name}\n" for name in BONE_NAMES))
+def test_bone_names_in_csharp(harness):
+    lines = run(harness("csharp"), "names", text="".join(f"{name}\n" for name in BONE_NAMES))
     for line, (name, meaning) in zip(lines, BONE_NAMES.items(), strict=True):
         if meaning is None:
             assert line == "none", name

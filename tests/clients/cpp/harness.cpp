@@ -17,6 +17,7 @@
 #include "Decoder.h"
 #include "Interpolator.h"
 #include "LocalClock.h"
+#include "Skeleton.h"
 
 using namespace manipnet;
 
@@ -126,11 +127,37 @@ void Axes() {
     }
 }
 
+/// From a message in hex: name, parent and local pose of every bone of the left hand.
+void DescribeSkeleton() {
+    std::string hex;
+    std::cin >> hex;
+    const std::vector<std::uint8_t> data = FromHex(hex);
+    HandsFrame frame;
+    if (!Decode(data.data(), data.size(), frame).empty()) std::abort();
+    Skeleton::Poses poses;
+    Skeleton::LocalPoses(frame.Hand(Side::Left), poses);
+    for (std::size_t bone = 0; bone < Skeleton::kBones; ++bone) {
+        const UnrealPose& p = poses[bone];
+        std::cout << Skeleton::BoneName(bone) << " " << Skeleton::ParentOf(bone);
+        for (const double x : {p.X, p.Y, p.Z, p.QX, p.QY, p.QZ, p.QW}) std::cout << " " << Number(x);
+        std::cout << "\n";
+    }
+}
+
+/// What every line, as a connection string, means.
+void Connections() {
+    for (std::string line; std::getline(std::cin, line);) {
+        Connection to;
+        const std::string error = ParseConnection(line, to);
+        if (!error.empty()) std::cout << "error: " << error << "\n";
+        else std::cout << to.Host << " " << to.Port << " '" << to.Actor << "' " << to.DelayS << "\n";
+    }
+}
+
 /// Show at 90 Hz until standard input ends; a line of figures for every line read.
 int Live(const std::string& address) {
-    std::string host;
-    std::uint16_t port = 0;
-    const std::string error = ParseAddress(address, host, port);
+    Connection to;
+    const std::string error = ParseConnection(address + " delay=0.05", to);
     if (!error.empty()) {
         std::cerr << error << "\n";
         return 2;
@@ -143,7 +170,7 @@ int Live(const std::string& address) {
         ended = true;
     });
     {
-        Client client(host, port, {}, 0.05);
+        Client client(to);
         HandsFrame shown;
         long shows = 0;
         for (int answered = 0; !ended;) {
@@ -187,6 +214,10 @@ int main(int count, char** words) {
         Interpolate();
     } else if (verb == "axes") {
         Axes();
+    } else if (verb == "skeleton") {
+        DescribeSkeleton();
+    } else if (verb == "connections") {
+        Connections();
     } else if (verb == "live" && count == 3) {
         return Live(words[2]);
     } else {

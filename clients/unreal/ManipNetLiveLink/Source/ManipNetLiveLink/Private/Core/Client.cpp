@@ -15,26 +15,8 @@ constexpr int kBackOffLimitMs = 1000;
 
 }  // namespace
 
-std::string ParseAddress(const std::string& address, std::string& host, std::uint16_t& port) {
-    static const std::string kScheme = "tcp://";
-    const std::size_t colon = address.rfind(':');
-    unsigned long number = 0;
-    bool good = address.compare(0, kScheme.size(), kScheme) == 0 && colon > kScheme.size() && colon != std::string::npos;
-    for (std::size_t i = colon + 1; good && i < address.size(); ++i) {
-        good = address[i] >= '0' && address[i] <= '9';
-        number = std::min(10 * number + static_cast<unsigned long>(address[i] - '0'), 65536UL);
-    }
-    if (!good || number == 0 || number > 65535)
-        return "address is \"" + address + "\"; allowed is tcp://HOST:PORT, as in tcp://127.0.0.1:5555";
-    host = address.substr(kScheme.size(), colon - kScheme.size());
-    if (host.size() > 2 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-    port = static_cast<std::uint16_t>(number);
-    return {};
-}
-
-Client::Client(std::string host, std::uint16_t port, std::string actor, double delayS)
-    : Host(std::move(host)), Port(port), OnlyActor(std::move(actor)), Subscriber(layout::kMaxPayloadBytes, Stopping) {
-    Frames.DelayS = delayS;
+Client::Client(const Connection& to) : To(to), Subscriber(layout::kMaxPayloadBytes, Stopping) {
+    Frames.DelayS = to.DelayS;
     Thread = std::thread([this] { Run(); });
 }
 
@@ -88,7 +70,7 @@ void Client::Run() {
 
 /// Until the connection breaks; returns why it did.
 std::string Client::Read() {
-    const std::string error = Subscriber.Open(Host, Port, layout::kTopic);
+    const std::string error = Subscriber.Open(To.Host, To.Port, layout::kTopic);
     if (!error.empty()) return error;
     {
         const std::lock_guard<std::mutex> guard(Lock);
@@ -128,7 +110,7 @@ void Client::Take(double arrival) {
 }
 
 bool Client::IsOurActor() const {
-    if (!OnlyActor.empty()) return OnlyActor == Spare->Actor.Text;
+    if (!To.Actor.empty()) return To.Actor == Spare->Actor.Text;
     return Counted.Received == 0 || Spare->Actor == Actor;
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "Connection.h"
 #include "Interpolator.h"
 #include "ZmtpSubscriber.h"
 
@@ -26,14 +27,11 @@ struct Stats {
     double AgeS = -1.0;  ///< Seconds since the newest frame; negative before the first.
 };
 
-/// Splits "tcp://HOST:PORT"; returns what is allowed, or an empty text.
-std::string ParseAddress(const std::string& address, std::string& host, std::uint16_t& port);
-
 /// Receives the hands of one actor (the first seen, unless named) on its own thread; reconnects by itself. All methods
 /// may be called from any thread; none waits for the network except the destructor, which waits for the thread.
 class Client {
 public:
-    Client(std::string host, std::uint16_t port, std::string actor = {}, double delayS = 0.1);
+    explicit Client(const Connection& to);
     ~Client();
     Client(const Client&) = delete;
     Client& operator=(const Client&) = delete;
@@ -49,9 +47,7 @@ private:
     bool IsOurActor() const;
     void SetState(const std::string& state);
 
-    const std::string Host;
-    const std::uint16_t Port;
-    const std::string OnlyActor;
+    const Connection To;
     mutable std::mutex Lock;
     std::condition_variable Wake;
     std::atomic<bool> Stopping{false};

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "Axes.h"
+#include "HandsFrame.h"
+
+namespace manipnet {
+
+/// A hand as a skeleton: the OpenXR joints, each relative to its parent, the wrist first and in the world.
+struct Skeleton {
+    static constexpr std::size_t kBones = layout::kJointCount;
+    using Poses = std::array<UnrealPose, kBones>;
+
+    static const char* BoneName(std::size_t bone);
+    static int ParentOf(std::size_t bone);  ///< -1 for the wrist.
+    static void LocalPoses(const HandFrame& hand, Poses& output);
+};
+
+}  // namespace manipnet
