@@ -1,16 +1,15 @@
 """A real server in a process of its own, and a sender and a subscriber to talk to it over real sockets."""
 
 import json
+import math
 import queue
-import re
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import msgpack
@@ -123,6 +122,7 @@ class Subscriber:
         socket.connect(address)
         assert monitor.poll(int(1e3 * PATIENCE_S)), "no connection"
         socket.disable_monitor()
+        monitor.close()
         self._thread = threading.Thread(target=self._run, args=(socket,), daemon=True)
         self._thread.start()
 
@@ -150,25 +150,53 @@ class Subscriber:
                     self._messages.put(self._decode(message[len(self._topic) :]))
 
 
-def play(sender: Sender, rate_hz: float, seconds: float, poses, start_s: float = 0.0) -> None:
-    """Send `poses(t)` in real time, `start_s` to `start_s + seconds` inclusive."""
-    begin = time.monotonic()
-    for i in range(round(seconds * rate_hz) + 1):
-        time.sleep(max(begin + i / rate_hz - time.monotonic(), 0.0))
-        sender.send(start_s + i / rate_hz, poses(start_s + i / rate_hz))
+Poses = Callable[[float], dict[str | int, Sequence[float] | None]]
+
+
+class Stage:
+    """A server with a sender and a subscriber, on which several performances follow each other."""
+
+    def __init__(self, server: LiveServer) -> None:
+        self.server = server
+        self.subscriber = Subscriber(server.addresses["hands"])
+        self.sender = Sender(server.addresses["bodies"])
+        self.start_s = 0.0
+
+    def perform(self, seconds: float, poses: Poses, rate_hz: float = 120.0) -> list[HandsMessage]:
+        """Send `poses(t)`, t from zero, in real time; the messages of exactly that time."""
+        self.start_s += 1000.0
+        begin_s = time.monotonic()
+        for i in range(round(seconds * rate_hz) + 1):
+            time.sleep(max(begin_s + i / rate_hz - time.monotonic(), 0.0))
+            self.sender.send(self.start_s + i / rate_hz, poses(i / rate_hz))
+        messages: list[HandsMessage] = []
+        while not messages or messages[-1].t_capture < self.start_s + seconds - 1e-6:
+            message = self.subscriber.next()
+            if -1e-6 <= message.t_capture - self.start_s <= seconds + 1e-6:
+                messages.append(message)
+        return messages
+
+    def counted(self, name: str, value: str) -> int:
+        """One of the server's counters."""
+        return self.server.ask({"op": "status"})["counters"].get(name, {}).get(value, 0)
+
+    def close(self) -> None:
+        self.sender.close()
+        self.subscriber.close()
+
+
+def scene(t_s: float) -> dict[str | int, Sequence[float] | None]:
+    """Two hands that hold a box between them and swing it."""
+    x, turn = 0.05 * math.sin(3.0 * t_s), (0.0, math.sin(0.2 * t_s), 0.0, math.cos(0.2 * t_s))
+    return {
+        "left_wrist": (x + 0.14, 1.0, 0.05, *turn),
+        "right_wrist": (x - 0.14, 1.0, 0.05, *turn),
+        "Box": (x, 1.0, 0.0, *turn),
+    }
 
 
 def _forward(stream, put) -> None:
-    for line in stream:
-        put(line.rstrip("\n"))
+    with stream:
+        for line in stream:
+            put(line.rstrip("\n"))
     put("")
-
-
-def address_port(address: str) -> int:
-    """The port in an address."""
-    found = re.search(r":(\d+)(/|$)", address)
-    assert found, address
-    return int(found[1])
-
-
-ROOT = Path(__file__).parents[1]

@@ -74,7 +74,7 @@ class TickLoop:
 
     def step(self, now_s: float) -> bool:
         """Show the next tick of every actor that has one due; False when none has."""
-        ticks = [(actor, actor.timeline.poll(now_s)) for actor in self.actors]
+        ticks = [(actor, self._poll(actor, now_s)) for actor in self.actors]
         plans = [(actor, tick, self._plan(actor, tick)) for actor, tick in ticks if tick is not None]
         steps = self._synthesise([plan for _, _, plan in plans if plan is not None])
         for actor, tick, plan in plans:
@@ -82,11 +82,25 @@ class TickLoop:
         return bool(plans)
 
     def _push(self, actor: Actor, frame: BodyFrame) -> str:
+        restarts = actor.timeline.restarts
         try:
-            return actor.push(frame) or _TAKEN
+            reason = actor.push(frame)
         except Exception as error:
             self._failed("input", error, [])
             return "internal"
+        if actor.timeline.restarts > restarts:
+            self._counters.add("sender_restarts", source=frame.source.partition(":")[0])
+        return reason or _TAKEN
+
+    def _poll(self, actor: Actor, now_s: float) -> Tick | None:
+        timeline = actor.timeline
+        late, cut = timeline.skipped_late, timeline.skipped_at_restart
+        tick = timeline.poll(now_s)
+        if timeline.skipped_late > late:
+            self._counters.add("ticks_skipped", timeline.skipped_late - late, reason="backlog")
+        if timeline.skipped_at_restart > cut:
+            self._counters.add("ticks_skipped", timeline.skipped_at_restart - cut, reason="restart")
+        return tick
 
     def _plan(self, actor: Actor, tick: Tick) -> Plan | None:
         try:
