@@ -208,7 +208,12 @@ def test_short_answers_are_noticed(read):
         read(b"short")
 
 
-@pytest.mark.parametrize("changes", [{"clock_hz": 0}, {"clock_hz": 2**63}, {"data_port": 0}])
+def test_server_info_may_end_after_the_versions():
+    info = read_server_info(server_info((4, 1))[:264])
+    assert (info.version, info.clock_hz, info.data_port, info.multicast_group) == ((4, 1), 0, 1511, None)
+
+
+@pytest.mark.parametrize("changes", [{"clock_hz": 2**63}, {"data_port": 0}])
 def test_impossible_server_info_is_noticed(changes):
     with pytest.raises(MessageError, match="server info names"):
         read_server_info(server_info(**changes))

@@ -207,7 +207,7 @@ ntp = (NTP_TO_UNIX_S + 5 << 32) + (1 << 31)
         ([bundle(pose(1), pose(2), tag=ntp)], 5.5),
         ([bundle(start(1), stamp(2_500.0), pose(1), end(1), tag=ntp)], 5.5),
         ([bundle(start(1), stamp(2_500.0), pose(1), end(1))], 2.5),
-        ([start(1), pose(1), end(1)], 100.0002),
+        ([start(1), pose(1), end(1)], 100.0),
         ([pose(1)], 100.0),
         ([bundle(pose(1), pose(2))], 100.0),
     ],
@@ -215,6 +215,15 @@ ntp = (NTP_TO_UNIX_S + 5 << 32) + (1 << 31)
 def test_time_of_a_frame(datagrams, t_s):
     (frame,) = play(*datagrams)
     assert frame.t_s == pytest.approx(t_s, abs=1e-9)
+
+
+@pytest.mark.parametrize("rate_hz", [30, 120, 360])
+def test_loose_frames_without_times_have_the_time_of_their_first_message(rate_hz):
+    times = [n / rate_hz + late for n in range(20) for late in (0.0, 0.0002, 0.0004)]
+    messages = [body(1, "position", *P), body(1, "quat", *Q), pose(2)] * 20
+    frames = play(*messages, times=times)
+    assert [frame.t_s for frame in frames] == pytest.approx([n / rate_hz for n in range(20)])
+    assert [frame.t_received_s for frame in frames] == pytest.approx([n / rate_hz + 0.0004 for n in range(20)])
 
 
 def test_a_frame_that_lost_its_time_stamp_is_left_out_and_counted():

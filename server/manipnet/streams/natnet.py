@@ -41,7 +41,7 @@ class MessageId(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ServerInfo:
-    """The server's answer to a connect packet. `clock_hz` is the rate of its tick stamps."""
+    """The server's answer to a connect packet. `clock_hz` is the rate of its tick stamps, zero if it tells none."""
 
     application: str
     application_version: tuple[int, int, int, int]
@@ -73,11 +73,14 @@ def connect_payload(application: str) -> bytes:
 
 def read_server_info(payload: bytes) -> ServerInfo:
     """The payload of `SERVER_INFO`."""
-    if len(payload) < _SENDER.size + _SERVER.size:
-        raise MessageError(f"server info has {len(payload)} bytes; {_SENDER.size + _SERVER.size} are needed")
+    if len(payload) < _SENDER.size:
+        raise MessageError(f"server info has {len(payload)} bytes; at least {_SENDER.size} are needed")
     name, *versions = _SENDER.unpack_from(payload)
-    clock_hz, data_port, is_multicast, *group = _SERVER.unpack_from(payload, _SENDER.size)
-    if not 0 < clock_hz < 10**12 or not data_port:
+    tail = payload[_SENDER.size :]
+    if len(tail) < _SERVER.size:  # a bridge that poses as Motive may leave out what follows the versions
+        tail = _SERVER.pack(0, DATA_PORT, 0, 0, 0, 0, 0)
+    clock_hz, data_port, is_multicast, *group = _SERVER.unpack_from(tail)
+    if clock_hz >= 10**12 or not data_port:
         raise MessageError(f"server info names a clock of {clock_hz} Hz and data port {data_port}")
     return ServerInfo(
         application=printable(name.partition(b"\0")[0]) or "unknown",

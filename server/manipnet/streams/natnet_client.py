@@ -180,7 +180,7 @@ class NatNetBodies:
                 self._names_wanted = False
             case MessageId.ECHO_RESPONSE if self._info is not None:
                 stamp, ticks = read_echo(payload)
-                if stamp == self._echo_stamp:
+                if stamp == self._echo_stamp and self._info.clock_hz:
                     self._clock.add(stamp * 1e-9, ticks / self._info.clock_hz, now_s)
             case MessageId.DISCONNECT:
                 self._info = None

@@ -25,6 +25,7 @@ class _Pending:
     stamp_s: float | None = None
     time_tag: int = IMMEDIATELY
     marked: bool = False
+    begun_s: float | None = None
     touched_s: float = 0.0
 
 
@@ -61,7 +62,7 @@ class FrameAssembler:
             self._take(route, time_tag, t_received_s, frames)
         # Some senders wrap each message in a bundle of its own: only a bundle of several ends a frame.
         if len(routes) > 1 and not self._pending.marked:
-            self._close(t_received_s, frames)
+            self._close(frames)
         return frames, bool(routes)
 
     def flush(self, now_s: float) -> list[BodyFrame]:
@@ -69,14 +70,15 @@ class FrameAssembler:
         frames: list[BodyFrame] = []
         patience_s = MARKED_GAP_S if self._pending.marked else GAP_S
         if self.pending and now_s - self._pending.touched_s > patience_s:
-            self._close(self._pending.touched_s, frames)
+            self._close(frames)
         return frames
 
     def _take(self, route: Route, time_tag: int, t_received_s: float, frames: list[BodyFrame]) -> None:
         if self._begins_anew(route, time_tag):
-            self._close(t_received_s, frames)
+            self._close(frames)
         pending = self._pending
         pending.touched_s = t_received_s
+        pending.begun_s = t_received_s if pending.begun_s is None else pending.begun_s
         if time_tag != IMMEDIATELY:
             pending.time_tag = time_tag
         match route.field:
@@ -84,7 +86,7 @@ class FrameAssembler:
                 pending.number, pending.marked = int(route.values[0]), True
             case "end":
                 pending.number = int(route.values[0])
-                self._close(t_received_s, frames)
+                self._close(frames)
             case "timestamp":
                 pending.stamp_s = route.values[0] / 1_000.0
             case _ if route.body in pending.bodies or len(pending.bodies) < MAX_BODIES:
@@ -105,20 +107,20 @@ class FrameAssembler:
             return pending.stamp_s is not None
         return route.field in pending.bodies.get(route.body, ())
 
-    def _close(self, t_received_s: float, frames: list[BodyFrame]) -> None:
+    def _close(self, frames: list[BodyFrame]) -> None:
         pending, self._pending = self._pending, _Pending()
         samples = [_sample(key, fields) for key, fields in pending.bodies.items()]
         bodies = tuple(sample for sample in samples if sample is not None)
         if not bodies:
             return
-        t_s = self._time(pending, t_received_s)
+        t_s = self._time(pending)
         if t_s is None:
             self.incomplete += 1
         else:
-            frames.append(BodyFrame(t_s, pending.number, bodies, t_received_s, self.source))
+            frames.append(BodyFrame(t_s, pending.number, bodies, pending.touched_s, self.source))
 
-    def _time(self, pending: _Pending, t_received_s: float) -> float | None:
-        times = {_ARRIVAL: t_received_s}
+    def _time(self, pending: _Pending) -> float | None:
+        times = {_ARRIVAL: pending.begun_s if pending.begun_s is not None else pending.touched_s}
         if pending.stamp_s is not None:
             times[_STAMP] = pending.stamp_s
         if pending.time_tag != IMMEDIATELY:
