@@ -17,6 +17,7 @@ from manipnet.objects.shape import build_shape
 
 LOW, HIGH = DOF_LIMITS_RAD.T
 FAR = np.array([5.0, 5.0, 5.0])
+NOT_TOUCHING = np.full(22, 1.0)
 fractions = arrays(np.float64, 20, elements=st.floats(0.15, 0.85))
 nudges = arrays(np.float64, 20, elements=st.floats(-0.15, 0.15))
 
@@ -33,7 +34,7 @@ def solve(name, ball, angles, targets, center=FAR):
     if name == "ccd":
         solve_ccd(angles, targets, DOF_LIMITS_RAD)
     else:
-        solve_least_squares(angles, targets, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0)
+        solve_least_squares(angles, targets, NOT_TOUCHING, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0)
     return angles
 
 

@@ -237,7 +237,7 @@ def _pose_kernel(
         if solver == 1:
             solve_ccd(angles, targets, limits)
         else:
-            solve_least_squares(angles, targets, limits, field, rotation, translation, scale)
+            solve_least_squares(angles, targets, distances, limits, field, rotation, translation, scale)
     forward_kinematics_into(angles, positions, rotations, axes)
 
 

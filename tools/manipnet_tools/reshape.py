@@ -97,6 +97,7 @@ def _solve_frames(angles, targets, wrist, obj, mirrored, limits, field):
     rotation, translation = np.empty((3, 3)), np.empty(3)
     local, identity = np.empty((22, 3)), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
     to_wrist, origin = np.empty((3, 3)), np.empty(3)
+    apart = np.full(22, 1.0)  # no joint is said to be in contact: targets alone decide
     for t in range(len(angles)):
         object_from_wrist(wrist[t], obj[t], mirrored, rotation, translation)
         # the map from the world to the wrist is the one to an object there
@@ -104,4 +105,4 @@ def _solve_frames(angles, targets, wrist, obj, mirrored, limits, field):
         for j in range(22):
             local[j] = to_wrist @ targets[t, j] + origin
         for _ in range(2):
-            solve_least_squares(angles[t], local, limits, field, rotation, translation, 1.0)
+            solve_least_squares(angles[t], local, apart, limits, field, rotation, translation, 1.0)

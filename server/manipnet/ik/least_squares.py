@@ -32,6 +32,11 @@ STAY_WEIGHT_M2 = 4e-5
 """Pull toward the network's angles, in square metres per square radian."""
 ALLOWED_DEPTH_M = 0.001
 """Skin gives: the captured fingers are about this deep where they press."""
+PULL_WEIGHT = 3.0
+PULL_REACH_M = 0.012
+"""Capsules this near the surface that the network says are in contact are pulled onto it."""
+CONTACT_MARGIN_M = 0.006
+"""A predicted distance of a capsule's radius means contact; this much more means none."""
 _MAX_STEP_RAD = 0.2
 
 
@@ -63,10 +68,12 @@ def _add_targets(finger, positions, axes, targets, normal, slope):
 
 
 @njit(cache=True, nogil=True)
-def _add_surface(finger, positions, axes, field, rotation, translation, scale, normal, slope):
+def _add_surface(finger, positions, axes, distances, field, rotation, translation, scale, normal, slope):
     row = np.empty(DOFS)
     for c in CAPSULES[finger]:
         start, end, radius = CAPSULE_STARTS[c], CAPSULE_ENDS[c], CAPSULE_RADII[c]
+        clearance = min(distances[start], distances[end]) - radius
+        touching = min(max(1.0 - clearance / CONTACT_MARGIN_M, 0.0), 1.0)
         for s in range(SAMPLES):
             f = (s + 0.5) / SAMPLES
             x = positions[start, 0] + f * (positions[end, 0] - positions[start, 0])
@@ -75,8 +82,11 @@ def _add_surface(finger, positions, axes, field, rotation, translation, scale, n
             px, py, pz = map_point(rotation, translation, scale, x, y, z)
             distance, gx, gy, gz = field_distance(field, px, py, pz)
             depth = radius - ALLOWED_DEPTH_M - distance * scale
+            weight = SURFACE_WEIGHT
             if depth <= 0.0:
-                continue
+                weight = PULL_WEIGHT * touching * max(1.0 + depth / PULL_REACH_M, 0.0) ** 2
+                if weight == 0.0:
+                    continue
             nx, ny, nz = map_direction_back(rotation, gx, gy, gz)
             for k in range(DOFS):
                 dof = DOFS * finger + k
@@ -85,9 +95,9 @@ def _add_surface(finger, positions, axes, field, rotation, translation, scale, n
                     jx, jy, jz = _jacobian_column(axes[dof], positions[DOF_JOINTS[dof]], x, y, z)
                     row[k] = nx * jx + ny * jy + nz * jz
             for a in range(DOFS):
-                slope[a] += SURFACE_WEIGHT * row[a] * depth
+                slope[a] += weight * row[a] * depth
                 for b in range(DOFS):
-                    normal[a, b] += SURFACE_WEIGHT * row[a] * row[b]
+                    normal[a, b] += weight * row[a] * row[b]
 
 
 @njit(cache=True, nogil=True)
@@ -110,7 +120,7 @@ def _solve_in_place(normal, slope):
 
 
 @njit(cache=True, nogil=True)
-def solve_least_squares(angles, targets, limits, field, rotation, translation, scale):
+def solve_least_squares(angles, targets, distances, limits, field, rotation, translation, scale):
     """Move `angles (20,)` in place toward joint `targets (22, 3)`, inside `limits (20, 2)`, out of the object."""
     start = angles.copy()
     positions, rotations = np.empty((22, 3)), np.empty((BONE_COUNT, 3, 3))
@@ -125,7 +135,7 @@ def solve_least_squares(angles, targets, limits, field, rotation, translation, s
                 normal[k, k] = STAY_WEIGHT_M2 + 1e-9
                 slope[k] = STAY_WEIGHT_M2 * (start[dof] - angles[dof])
             _add_targets(finger, positions, axes, targets, normal, slope)
-            _add_surface(finger, positions, axes, field, rotation, translation, scale, normal, slope)
+            _add_surface(finger, positions, axes, distances, field, rotation, translation, scale, normal, slope)
             _solve_in_place(normal, slope)
             for k in range(DOFS):
                 dof = DOFS * finger + k
