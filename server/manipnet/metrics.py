@@ -54,5 +54,5 @@ class _Figures(Collector):
             family.add_sample(f"{name}_count", {"stage": stage}, count)
             family.add_sample(f"{name}_sum", {"stage": stage}, sum_s)
             for quantile, value in zip(QUANTILES, self._timings.overall(stage, *QUANTILES), strict=True):
-                family.add_sample(name, {"stage": stage, "quantile": str(quantile / 100)}, value)
+                family.add_sample(name, {"stage": stage, "quantile": f"{quantile / 100:g}"}, value)
         return family

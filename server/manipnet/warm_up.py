@@ -42,18 +42,20 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
             counters,
             timings,
         )
+        start_s = time.monotonic()
         for i in range(FRAMES):
-            mailbox.put(_frame(i / FRAMES))
+            t_s = i / FRAMES
+            mailbox.put(_frame(t_s, start_s + t_s))
             loop.take_in(0.0)
-            while loop.step(time.monotonic()):
+            while loop.step(start_s + t_s):
                 pass
 
 
-def _frame(t_s: float) -> BodyFrame:
+def _frame(t_s: float, now_s: float) -> BodyFrame:
     swing = 0.02 * float(np.sin(2.0 * np.pi * t_s))
     bodies = (
         BodySample(None, "left_wrist", (0.15, swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),
         BodySample(None, "right_wrist", (-0.15, -swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),
         BodySample(None, "prop", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True),
     )
-    return BodyFrame(t_s, None, bodies, time.monotonic(), "warm-up")
+    return BodyFrame(t_s, None, bodies, now_s, "zmq:warm-up")
