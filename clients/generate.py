@@ -146,7 +146,15 @@ def files() -> dict[Path, str]:
         FOLDER / "unity/com.manipnet.client/Runtime/Core/Layout.cs": csharp_layout(),
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/Layout.h": cpp_layout(),
         FOLDER / "web/layout.js": javascript_layout(),
-    }
+    } | _vendored()
+
+
+def _vendored() -> dict[Path, str]:
+    """The Blender extension carries the Python client with it: Blender installs nothing from elsewhere."""
+    source, target = FOLDER / "python/manipnet_client", FOLDER / "blender/manipnet_live/manipnet_client"
+    copies = {path.name: path.read_text(encoding="utf-8") for path in sorted(source.glob("*.py"))}
+    copies["layout.py"] = python_layout()
+    return {target / name: text for name, text in copies.items()}
 
 
 if __name__ == "__main__":

@@ -23,10 +23,11 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def hand(x_m: float, turn_rad: float) -> HandPose:
-    """A flat hand at `(x, 0, 0)` turned about z, every joint like the wrist, every angle the turn."""
+    """A hand at `(x, 0, 0)` turned about z, every joint like the wrist, every angle the turn, every bone a quarter."""
     quat = np.array([0.0, 0.0, np.sin(turn_rad / 2), np.cos(turn_rad / 2)])
     pose = np.array([x_m, 0.0, 0.0, *quat])
-    rotations = np.tile(IDENTITY, (17, 1))
+    rotations = np.tile([0.0, np.sin(turn_rad / 8), 0.0, np.cos(turn_rad / 8)], (17, 1))
+    rotations[0] = IDENTITY
     return HandPose("live", "cube", 1.0, np.full(20, turn_rad), rotations, pose, np.tile(pose, (26, 1)))
 
 

@@ -1,0 +1,121 @@
+"""Fingers of any rig: turn its bones so that they point where ours do, whatever its axes, lengths and bind pose are.
+
+Right-handed axes throughout, as in the messages and in Blender; quaternions xyzw.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .layout import ZERO_POSITIONS, ZERO_ROTATIONS
+from .message import Hand
+
+FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
+PARTS = ("Proximal", "Intermediate", "Distal")
+BONES = np.arange(2, 17)
+"""Our bone for each finger bone of a rig. The two carpal thumb angles multiply into what rigs call the first one."""
+
+_ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
+_PARENTS = (-1, 0, 1, 2, 3, 0, 5, 6, 0, 8, 9, 0, 11, 12, 0, 14, 15)
+_INDEX, _MIDDLE, _LITTLE = 3, 6, 12
+
+
+class HandRig:
+    """The bind pose of one hand of a rig, in the space of its hand bone.
+
+    `positions (15, 3)` and `rotations (15, 4)`, thumb to little finger, proximal to distal, and `tips (5, 3)`.
+    """
+
+    def __init__(self, side: str, positions: np.ndarray, rotations: np.ndarray, tips: np.ndarray) -> None:
+        flip = 1.0 if side == "right" else -1.0
+        zero_p = ZERO_POSITIONS * [flip, 1.0, 1.0]
+        zero_q = ZERO_ROTATIONS * [1.0, flip, flip, 1.0]
+        ours = _frame(zero_p[BONES[_MIDDLE]], zero_p[BONES[_INDEX]] - zero_p[BONES[_LITTLE]])
+        theirs = _frame(positions[_MIDDLE], positions[_INDEX] - positions[_LITTLE])
+        self.wrist_to_hand = multiply(theirs, conjugate(ours))
+        self._bind = np.empty((15, 4))
+        for i in range(15):
+            end = tips[i // 3] if i % 3 == 2 else positions[i + 1]
+            wanted = rotate(self.wrist_to_hand, zero_p[_ENDS[i]] - zero_p[BONES[i]])
+            turned = multiply(from_to(end - positions[i], wanted), rotations[i])
+            back = multiply(conjugate(zero_q[BONES[i]]), conjugate(self.wrist_to_hand))
+            self._bind[i] = multiply(back, turned)
+
+    def hand_rotation(self, hand: Hand) -> np.ndarray:
+        """The world rotation of the rig's hand bone that puts it where the tracked wrist is, `(4,)`."""
+        return multiply(hand.wrist[3:], conjugate(self.wrist_to_hand))
+
+    def solve(self, hand: Hand) -> np.ndarray:
+        """Rotations of the finger bones in the space of the rig's hand bone, `(15, 4)`."""
+        world = np.empty((17, 4))
+        world[0] = self.wrist_to_hand
+        for bone in range(1, 17):
+            world[bone] = multiply(world[_PARENTS[bone]], hand.rotations[bone])
+        out = np.array([multiply(world[bone], bind) for bone, bind in zip(BONES, self._bind, strict=True)])
+        return out / np.linalg.norm(out, axis=1, keepdims=True)
+
+
+def matches(bone: str, side: str, finger: int, part: int) -> bool:
+    """Whether a rig's bone name means this finger bone.
+
+    Understood: Unity and VMC (LeftIndexProximal), Mixamo (mixamorig:LeftHandIndex1), Unreal (index_01_l), Rigify
+    (f_index.01.L), VRoid (J_Bip_L_Index1).
+    """
+    name, letter, number = _plain(bone), side[0], part + 1
+    if name == f"{side}{FINGERS[finger]}{PARTS[part]}".lower():
+        return True
+    words = (FINGERS[finger].lower(), "pinky")[: 2 if finger == 4 else 1]
+    patterns = (f"{side}hand%s{number}", f"%s0{number}{letter}", f"f%s0{number}{letter}", f"jbip{letter}%s{number}")
+    return any(name == pattern % word for pattern in patterns for word in words)
+
+
+def is_hand(bone: str, side: str) -> bool:
+    """Whether a rig's bone name means the hand itself."""
+    letter = side[0]
+    return _plain(bone) in (f"{side}hand", f"hand{letter}", f"jbip{letter}hand", f"defhand{letter}")
+
+
+def _plain(name: str) -> str:
+    return "".join(c for c in name.rpartition(":")[2] if c.isalnum()).lower()
+
+
+def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotation `b` followed by `a`, `(4,)` each."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+    return np.array(
+        [
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ]
+    )
+
+
+def conjugate(q: np.ndarray) -> np.ndarray:
+    """The inverse of a unit quaternion."""
+    return q * [-1.0, -1.0, -1.0, 1.0]
+
+
+def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """A vector turned by a unit quaternion."""
+    t = 2.0 * np.cross(q[:3], v)
+    return v + q[3] * t + np.cross(q[:3], t)
+
+
+def from_to(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """The shortest turn that carries one direction into another."""
+    start, end = start / np.linalg.norm(start), end / np.linalg.norm(end)
+    q = np.append(np.cross(start, end), 1.0 + start @ end)
+    if q[3] < 1e-6:  # opposite: half a turn about anything across
+        q = np.append(np.cross(start, [1.0, 0.0, 0.0] if abs(start[0]) < 0.7 else [0.0, 1.0, 0.0]), 0.0)
+    return q / np.linalg.norm(q)
+
+
+def _frame(along: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """The orientation with x along the hand and y toward `across`."""
+    first = from_to(np.array([1.0, 0.0, 0.0]), along)
+    unit = along / np.linalg.norm(along)
+    _, y, z = rotate(conjugate(first), across - (across @ unit) * unit)
+    half = 0.5 * np.arctan2(z, y)
+    return multiply(first, np.array([np.sin(half), 0.0, 0.0, np.cos(half)]))

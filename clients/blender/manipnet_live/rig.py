@@ -1,0 +1,115 @@
+"""Hands on things in the scene: bones of an armature, or empties at the joints."""
+
+import bpy
+import mathutils
+import numpy as np
+
+from .axes import to_blender, turned_to_blender
+from .manipnet_client import Hand
+from .manipnet_client.layout import JOINT_NAMES
+from .manipnet_client.retarget import FINGERS, PARTS, HandRig, conjugate, is_hand, matches, multiply, rotate
+
+
+class RigError(ValueError):
+    """An armature whose fingers cannot be found; the text names the missing bones."""
+
+
+class ArmatureHand:
+    """One hand of an armature. The rest pose may be any: bones are turned to point where the synthesised ones do."""
+
+    def __init__(self, armature: bpy.types.Object, side: str, follow_wrist: bool) -> None:
+        self._armature, self._side, self._follow_wrist = armature, side, follow_wrist
+        bones = {bone.name: bone for bone in armature.data.bones}
+        hand = next((name for name in bones if is_hand(name, side)), None)
+        names = [
+            next((name for name in bones if matches(name, side, finger, part)), None)
+            for finger in range(len(FINGERS))
+            for part in range(len(PARTS))
+        ]
+        wanted = ["Hand"] + [finger + part for finger in FINGERS for part in PARTS]
+        missing = [what for what, name in zip(wanted, [hand, *names], strict=True) if name is None]
+        if missing:
+            raise RigError(f"{armature.name} has no bone for {', '.join(missing)} of the {side} hand")
+        self.bone_names = [str(name) for name in names]
+        self.hand_name = str(hand)
+        self._bind(bones)
+
+    def _bind(self, bones: dict) -> None:
+        hand = bones[self.hand_name]
+        to_hand = conjugate(_rotation(hand.matrix_local))
+        origin = np.array(hand.head_local)
+        found = [bones[name] for name in self.bone_names]
+
+        def local(point: object) -> np.ndarray:
+            return rotate(to_hand, np.array(point) - origin)
+
+        self._rest = np.array([multiply(to_hand, _rotation(bone.matrix_local)) for bone in found])
+        heads = np.array([local(bone.head_local) for bone in found])
+        tips = np.array([local(bone.tail_local) for bone in found[2::3]])
+        self._rig = HandRig(self._side, heads, self._rest, tips)
+        parents = [bone.parent.name if bone.parent else "" for bone in found]
+        self._parents = [self.bone_names.index(name) if name in self.bone_names else -1 for name in parents]
+
+    def solve(self, hand: Hand) -> np.ndarray:
+        """Each bone's rotation from its rest pose, as Blender wants it, `(15, 4)` wxyz."""
+        turned = self._rig.solve(hand)
+        basis = np.empty((len(turned), 4))
+        for i, parent in enumerate(self._parents):
+            basis[i] = multiply(conjugate(self._rest[i]), turned[i])
+            if parent >= 0:
+                carried = multiply(self._rest[parent], conjugate(turned[parent]))
+                basis[i] = multiply(conjugate(self._rest[i]), multiply(carried, turned[i]))
+        return basis[:, [3, 0, 1, 2]]
+
+    def show(self, hand: Hand, weight: float) -> None:
+        """Pose the bones; `weight` below one mixes in the pose they have."""
+        bones = self._armature.pose.bones
+        if self._follow_wrist:
+            place = mathutils.Vector(to_blender(hand.wrist)[:3])
+            x, y, z, w = turned_to_blender(self._rig.hand_rotation(hand))
+            world = mathutils.Matrix.LocRotScale(place, mathutils.Quaternion((w, x, y, z)), None)
+            bones[self.hand_name].matrix = self._armature.matrix_world.inverted() @ world
+        for name, basis in zip(self.bone_names, self.solve(hand), strict=True):
+            bone = bones[name]
+            bone.rotation_mode = "QUATERNION"
+            if weight < 1.0:
+                basis = _mix(np.array(bone.rotation_quaternion), basis, weight)
+            bone.rotation_quaternion = basis
+
+
+class JointEmpties:
+    """One hand as empties at its 26 OpenXR joints, +y to the finger tip; made when they are not there."""
+
+    def __init__(self, side: str) -> None:
+        self._objects = []
+        for joint in JOINT_NAMES:
+            name = f"manipnet_{side}_{joint}"
+            found = bpy.data.objects.get(name) or self._make(name)
+            self._objects.append(found)
+
+    def _make(self, name: str) -> bpy.types.Object:
+        made = bpy.data.objects.new(name, None)
+        made.empty_display_type = "ARROWS"
+        made.empty_display_size = 0.01
+        made.rotation_mode = "QUATERNION"
+        bpy.context.scene.collection.objects.link(made)
+        return made
+
+    def show(self, hand: Hand, weight: float) -> None:
+        """Move the empties; they stay where they are once the stream has faded."""
+        if weight > 0.0:
+            for found, joint in zip(self._objects, hand.joints, strict=True):
+                x, y, z, qx, qy, qz, qw = to_blender(joint)
+                found.location = (x, y, z)
+                found.rotation_quaternion = (qw, qx, qy, qz)
+
+
+def _mix(a: np.ndarray, b: np.ndarray, weight: float) -> np.ndarray:
+    mixed = (1.0 - weight) * a + weight * (b if a @ b >= 0.0 else -b)
+    return mixed / max(float(np.linalg.norm(mixed)), 1e-6)
+
+
+def _rotation(matrix: object) -> np.ndarray:
+    """The rotation of a 4x4 matrix as a quaternion xyzw."""
+    w, x, y, z = mathutils.Matrix(matrix).to_quaternion()
+    return np.array([x, y, z, w])

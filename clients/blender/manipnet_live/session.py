@@ -1,0 +1,107 @@
+"""One connection and what it drives. The client reads on its own thread and never touches Blender; a timer shows."""
+
+import time
+
+import bpy
+import numpy as np
+
+from .manipnet_client import Client, Stats
+from .manipnet_client.zmtp import parse_address
+from .recording import Recording
+from .rig import ArmatureHand, JointEmpties
+
+SHOW_EVERY_S = 1.0 / 60.0
+REDRAW_EVERY_S = 0.25
+SIDES = ("left", "right")
+
+
+class Session:
+    """At most one at a time. All methods belong to Blender's main thread."""
+
+    def __init__(self) -> None:
+        self._client: Client | None = None
+        self._hands: dict[str, ArmatureHand | JointEmpties] = {}
+        self._recording: Recording | None = None
+        self._armature: bpy.types.Object | None = None
+        self._redrawn_s = 0.0
+
+    @property
+    def is_running(self) -> bool:
+        """Whether there is a connection, or the wish for one."""
+        return self._client is not None
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether instants are being collected."""
+        return self._recording is not None
+
+    @property
+    def can_record(self) -> bool:
+        """Whether there is an armature to make keyframes for."""
+        return self._armature is not None
+
+    def stats(self) -> Stats:
+        """For the panel."""
+        return self._client.stats() if self._client else Stats(state="off")
+
+    def start(self, address: str, actor: str, delay_s: float, armature: bpy.types.Object | None, wrists: bool) -> None:
+        """Connect and begin to show; raises `ValueError` for a wrong address and `RigError` for an unknown rig."""
+        parse_address(address)
+        self.stop()
+        self._hands = {s: ArmatureHand(armature, s, wrists) if armature else JointEmpties(s) for s in SIDES}
+        self._armature = armature
+        self._client = Client(address, actor or None, delay_s)
+        bpy.app.timers.register(self._tick, first_interval=0.0)
+
+    def stop(self) -> None:
+        """Disconnect; a recording that runs is written first."""
+        if self._client is None:
+            return
+        self.stop_recording()
+        client, self._client = self._client, None
+        if bpy.app.timers.is_registered(self._tick):
+            bpy.app.timers.unregister(self._tick)
+        client.close()
+        self._hands = {}
+        self._armature = None
+
+    def start_recording(self) -> None:
+        """Collect what is shown from now on."""
+        if self._armature:
+            names = [name for hand in self._hands.values() for name in hand.bone_names]
+            self._recording = Recording(self._armature, names)
+
+    def stop_recording(self) -> int:
+        """Write the keyframes, from the scene's current frame on; returns how many frames."""
+        recording, self._recording = self._recording, None
+        if recording is None:
+            return 0
+        scene = bpy.context.scene
+        return recording.write(scene.frame_current, scene.render.fps / scene.render.fps_base)
+
+    def _tick(self) -> float | None:
+        """Show the newest; nothing piles up, however slow Blender is. None ends the timer."""
+        if self._client is None:
+            return None
+        now_s = time.monotonic()
+        shown = self._client.sample(now_s)
+        if shown is not None:
+            present = {side: hand for side in SIDES if (hand := shown.hands.hand(side)) is not None}
+            for side, hand in present.items():
+                self._hands[side].show(hand, shown.weight)
+            if self._recording is not None and len(present) == len(SIDES):
+                rotations = [self._hands[side].solve(present[side]) for side in SIDES]
+                self._recording.add(now_s, np.concatenate(rotations))
+        if now_s - self._redrawn_s > REDRAW_EVERY_S:
+            self._redrawn_s = now_s
+            self._redraw()
+        return SHOW_EVERY_S
+
+    def _redraw(self) -> None:
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "VIEW_3D":
+                    area.tag_redraw()
+
+
+session = Session()
