@@ -15,9 +15,13 @@ from typing import Any
 import msgpack
 import zmq
 
+from manipnet.streams.curve import secure_client
+from manipnet.streams.keys import ClientKeys
 from manipnet.streams.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, decode_binary, decode_msgpack
 
 PATIENCE_S = 60.0
+START_S = 300.0
+"""The first start after a change compiles everything, perhaps on a busy machine."""
 FREE_PORTS = [f"--{name}=0" for name in ("port", "input-port", "control-port", "osc-port", "page-port")]
 
 
@@ -38,7 +42,7 @@ class LiveServer:
         self.addresses: dict[str, str] = {}
 
     def wait_ready(self) -> "LiveServer":
-        line = self.line()
+        line = self.lines.get(timeout=START_S)
         assert line.startswith("ready "), (line, self.errors)
         words = line.split()[1:]
         self.addresses = dict(zip(words[::2], words[1::2], strict=True))
@@ -48,10 +52,12 @@ class LiveServer:
         """The next line on standard output; empty when the server has ended."""
         return self.lines.get(timeout=PATIENCE_S)
 
-    def ask(self, request: Any, as_json: bool = False) -> dict[str, Any]:
+    def ask(self, request: Any, as_json: bool = False, keys: ClientKeys | None = None) -> dict[str, Any]:
         """One control request and its answer."""
         with zmq.Context() as context, context.socket(zmq.REQ) as req:
             req.setsockopt(zmq.LINGER, 0)
+            if keys is not None:
+                secure_client(req, keys)
             req.connect(self.addresses["control"])
             packed = request if isinstance(request, bytes) else msgpack.packb(request) or b""
             req.send(json.dumps(request).encode() if as_json else packed)

@@ -7,10 +7,12 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+import zmq
 
 from live_server import serving
 from manipnet import cli
 from manipnet.objects.library import LIBRARY_FOLDER
+from manipnet.streams.keys import make_client_keys, make_server_keys, read_client_keys
 from tiny_bundle import write_tiny_bundle
 
 CUBE = LIBRARY_FOLDER / "cube.ply"
@@ -61,6 +63,8 @@ def test_a_port_in_use_is_named_with_its_option(
         (["--rig", "nowhere.toml"], "nowhere.toml: cannot be read"),
         (["--rig", "r.toml", "--mesh", "Box=x.obj"], "--rig names the objects itself"),
         (["--host", "0.0.0.0"], "--host 0.0.0.0 can be reached from other machines"),
+        (["--host", "0.0.0.0", "--keys", "keys"], "--allow NETWORK for OSC"),
+        (["--allow", "stage"], "'stage' is no address or network"),
         (["--look-ahead", "2"], "look_ahead is 2.0 s; allowed are 0 … 0.5 s"),
         (["--port", "99999"], "--port is 99999; allowed are 0 (any free one) … 65535"),
         (["--vmc", "host:port"], "'host:port' is no HOST[:PORT]"),
@@ -94,3 +98,28 @@ def test_a_bundle_of_another_layout_is_refused(tmp_path: Path, capsys: pytest.Ca
     meta.write_text(meta.read_text().replace('"proximity"', '"sonar"'))
     assert cli.main(["--model", str(folder)]) == 1
     assert "another feature layout" in capsys.readouterr().err
+
+
+def test_with_keys_only_listed_clients_are_let_in(tiny_bundle: Path, tmp_path: Path) -> None:
+    make_server_keys(tmp_path)
+    keys = read_client_keys(make_client_keys(tmp_path, "stage-pc"))
+    with serving("--model", str(tiny_bundle), "--keys", str(tmp_path)) as server:
+        with zmq.Context() as context:
+            for what, kind in (("hands", zmq.SUB), ("bodies", zmq.PUB), ("control", zmq.REQ)):
+                with context.socket(kind) as stranger:
+                    stranger.setsockopt(zmq.LINGER, 0)
+                    monitor = stranger.get_monitor_socket(zmq.EVENT_DISCONNECTED | zmq.EVENT_HANDSHAKE_FAILED_NO_DETAIL)
+                    stranger.connect(server.addresses[what])
+                    assert monitor.poll(20_000), f"{what}: a client without keys was let in"
+                    stranger.disable_monitor()
+                    monitor.close()
+        counters = server.ask({"op": "status"}, keys=keys)["counters"]
+        assert counters["connections_refused"]["handshake"] >= 3
+        assert "left" in server.ask({"op": "status"}, keys=keys)["actors"]["actor"]["hands"]
+
+
+def test_keys_that_are_not_there_are_named(
+    tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["--model", str(tiny_bundle), "--keys", str(tmp_path)]) == 1
+    assert "server.toml does not exist; make it with `manipnet keys make server`" in capsys.readouterr().err

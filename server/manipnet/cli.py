@@ -61,6 +61,8 @@ def build_parser() -> argparse.ArgumentParser:
     _option(where, "osc_port", int, "PORT", "bodies in, OSC over UDP")
     _option(where, "page_port", int, "PORT", "live page, HTTP and WebSocket")
     where.add_argument("--metrics-port", type=int, metavar="PORT", help="Prometheus metrics, HTTP (default: none)")
+    where.add_argument("--keys", type=Path, metavar="FOLDER", help="let in only clients with keys: see `manipnet keys`")
+    where.add_argument("--allow", action="append", metavar="NETWORK", help="who may send OSC; repeatable")
     where.add_argument("--insecure", action="store_true", help="let any machine in when --host is not loopback")
     also = parser.add_argument_group("what else it sends")
     also.add_argument("--vmc", metavar="HOST[:39539]", help="VMC bones, OSC over UDP")
@@ -78,6 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from manipnet.objects.mesh import MeshError
     from manipnet.server import Server
     from manipnet.streams.intake import ListenError
+    from manipnet.streams.keys import KeyFileError
     from manipnet.terminal import Terminal
 
     stop = _stop_on_signals()
@@ -86,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         server = Server(configure(arguments), terminal.say)
         server.run(stop.is_set)
-    except (ConfigError, BundleError, MeshError, ListenError) as error:
+    except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
     finally:
@@ -110,7 +113,7 @@ def _option(group: Any, name: str, kind: type, metavar: str, text: str) -> None:
 
 def configure(arguments: argparse.Namespace):
     """Defaults, then the rig file's `[server]`, then the command line. Raises `ConfigError`."""
-    from manipnet.config import ConfigError, ServerConfig, default_actor, parse_endpoint, parse_object
+    from manipnet.config import ConfigError, ServerConfig, default_actor, parse_endpoint, parse_network, parse_object
     from manipnet.rig import load_rig
     from manipnet.streams import livelink_json, natnet, vmc
 
@@ -132,6 +135,8 @@ def configure(arguments: argparse.Namespace):
     ):
         if name in options:
             options[name] = parse_endpoint(options[name], port)
+    if "allow" in options:
+        options["allow"] = tuple(parse_network(text) for text in options["allow"])
     known = {field.name for field in fields(ServerConfig)}
     return ServerConfig(actors, **{name: value for name, value in options.items() if name in known})
 

@@ -7,6 +7,7 @@ from typing import Final, Literal
 
 from manipnet.geometry import Array
 from manipnet.network.bundle import DEFAULT_MODEL
+from manipnet.streams.guard import Network
 from manipnet.timeline import MAX_LOOK_AHEAD_S
 
 BodyKey = int | str
@@ -74,6 +75,10 @@ class ServerConfig:
     livelink: tuple[str, int] | None = None
     model: str = DEFAULT_MODEL
     look_ahead_s: float = MAX_LOOK_AHEAD_S
+    keys: Path | None = None
+    """Folder of the CURVE keys of `manipnet keys`."""
+    allow: tuple[Network, ...] = ()
+    """Networks that may send OSC; none given means any that reaches the port."""
     insecure: bool = False
     demo: bool = False
     dump_dir: Path | None = None
@@ -105,6 +110,14 @@ def parse_endpoint(text: str, default_port: int) -> tuple[str, int]:
     return host, int(port) if port else default_port
 
 
+def parse_network(text: str) -> Network:
+    """An address, or a network as `192.168.1.0/24`. Raises `ConfigError`."""
+    try:
+        return ipaddress.ip_network(text, strict=False)
+    except ValueError:
+        raise ConfigError(f"{text!r} is no address or network, for example 192.168.1.7 or 192.168.1.0/24") from None
+
+
 def is_loopback(host: str) -> bool:
     """Whether only this machine can reach `host`."""
     try:
@@ -121,10 +134,11 @@ def check(config: ServerConfig) -> None:
             raise ConfigError(f"--{option.replace('_', '-')} is {port}; allowed are 0 (any free one) … 65535")
     if not 0.0 <= config.look_ahead_s <= MAX_LOOK_AHEAD_S:
         raise ConfigError(f"look_ahead is {config.look_ahead_s} s; allowed are 0 … {MAX_LOOK_AHEAD_S} s")
-    if not is_loopback(config.host) and not config.insecure:
+    if not (is_loopback(config.host) or config.insecure or (config.keys is not None and config.allow)):
         raise ConfigError(
             f"--host {config.host} can be reached from other machines, and nothing would keep strangers out. "
-            "Stay on 127.0.0.1 and tunnel (ssh -L), or add --insecure on a network you trust"
+            "Give --keys FOLDER for ZeroMQ (`manipnet keys`) and --allow NETWORK for OSC; or stay on 127.0.0.1 and "
+            "tunnel (ssh -L); or add --insecure on a network you trust"
         )
     _check_actors(config.actors)
 

@@ -11,7 +11,8 @@ from typing import Any, Final
 import msgpack
 import zmq
 
-from manipnet.publisher import bind
+from manipnet.publisher import bind, guard
+from manipnet.streams.keys import ServerKeys
 from manipnet.streams.zmq_bodies import zmq_endpoint
 from manipnet.telemetry import CONTROL_OPS, Counters
 
@@ -30,8 +31,15 @@ class RequestError(ValueError):
 class Control:
     """Answers requests on `tcp://host:port` with `handlers`, one per operation, each called on this thread."""
 
-    def __init__(self, host: str, port: int, handlers: Mapping[str, Handler], counters: Counters) -> None:
-        """Binds; raises `ListenError`. `start` begins to answer."""
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        handlers: Mapping[str, Handler],
+        counters: Counters,
+        keys: ServerKeys | None = None,
+    ) -> None:
+        """Binds; raises `ListenError`. `start` begins to answer. With `keys` only clients on their list may ask."""
         self._handlers, self._counters = handlers, counters
         endpoint, ipv6 = zmq_endpoint(host, port)
         self._context = zmq.Context()
@@ -43,6 +51,7 @@ class Control:
         rep.setsockopt(zmq.HEARTBEAT_IVL, 1_000)
         rep.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
         rep.setsockopt(zmq.IPV6, int(ipv6))
+        guard(rep, self._context, keys, counters)
         try:
             bind(rep, endpoint, "--control-port")
         except BaseException:

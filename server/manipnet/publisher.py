@@ -6,7 +6,9 @@ import socket
 import zmq
 
 from manipnet.config import ConfigError, ServerConfig
+from manipnet.streams.curve import Gatekeeper
 from manipnet.streams.intake import ListenError
+from manipnet.streams.keys import ServerKeys
 from manipnet.streams.livelink_json import LiveLinkJsonSender
 from manipnet.streams.vmc import VmcSender
 from manipnet.streams.websocket import WebSocketPublisher
@@ -23,16 +25,19 @@ _log = logging.getLogger(__name__)
 class Publisher:
     """The outputs of one server: ZeroMQ and WebSocket always, VMC and Live Link where configured."""
 
-    def __init__(self, config: ServerConfig, counters: Counters) -> None:
-        """Binds all sockets; raises `ListenError` or `ConfigError`, and then holds none."""
-        self._counters = counters
+    def __init__(self, config: ServerConfig, counters: Counters, keys: ServerKeys | None = None) -> None:
+        """Binds all sockets; raises `ListenError` or `ConfigError`, and then holds none.
+
+        With `keys` only clients on their list may subscribe, and the page, which has none, stays on this machine.
+        """
+        self._counters, self._keys = counters, keys
         self._context = zmq.Context()
         self._pub: zmq.Socket | None = None
         self._web: WebSocketPublisher | None = None
         self._senders: list[tuple[str, VmcSender | LiveLinkJsonSender]] = []
         try:
             self._pub = self._bind_pub(config.host, config.port)
-            self._web = _bind_web(config.host, config.page_port)
+            self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.page_port)
             if config.vmc is not None:
                 self._senders.append(("vmc", VmcSender(*_resolve("--vmc", config.vmc))))
             if config.livelink is not None:
@@ -85,8 +90,17 @@ class Publisher:
         pub.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
         pub.setsockopt(zmq.MAXMSGSIZE, 256)  # subscriptions are all that comes in
         pub.setsockopt(zmq.IPV6, int(ipv6))
+        guard(pub, self._context, self._keys, self._counters)
         bind(pub, endpoint, "--port")
         return pub
+
+
+def guard(sock: zmq.Socket, context: zmq.Context, keys: ServerKeys | None, counters: Counters) -> None:
+    """Let only clients on the keys' list connect to the context's one socket. Call before it is bound."""
+    if keys is not None:
+        gatekeeper = Gatekeeper(context, keys, counters)
+        gatekeeper.secure(sock)
+        gatekeeper.start()
 
 
 def bind(sock: zmq.Socket, endpoint: str, option: str) -> None:

@@ -32,10 +32,12 @@ SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
     "livelink": (str,),
     "model": (str,),
     "look_ahead": (int, float),
+    "keys": (str,),
+    "allow": (list,),
 }
 """What the table `[server]` may hold: the command line's options of these names, which win over it."""
 
-_KINDS = {str: "text", int: "an integer", float: "a number", bool: "true or false"}
+_KINDS = {str: "text", int: "an integer", float: "a number", bool: "true or false", list: "a list of text"}
 _ACTOR_KEYS = ("bodies", "objects", "hand_scale")
 _OFFSET_KEYS = ("body", "position", "rotation")
 
@@ -85,6 +87,8 @@ class _Reader:
             self._typed(value, SERVER_KEYS[key], at)
             if allowed := _wrong(key, value):
                 self._fail(at, f"is {value!r}; allowed are {allowed}")
+        if "keys" in server:
+            server["keys"] = self._path.parent / server["keys"]
         return Rig(actors, server)
 
     def _actor(self, table: dict[str, Any], at: tuple) -> ActorConfig:
@@ -177,6 +181,8 @@ def _wrong(key: str, value: Any) -> str:
         return "0 (any free one) … 65535"
     if key == "look_ahead" and not 0.0 <= value <= MAX_LOOK_AHEAD_S:
         return f"0 … {MAX_LOOK_AHEAD_S} s"
+    if key == "allow" and not all(isinstance(network, str) for network in value):
+        return "networks as text, for example 192.168.1.0/24"
     return "y, z" if key == "up" and value not in ("y", "z") else ""
 
 

@@ -21,7 +21,8 @@ from manipnet.props import Wardrobe
 from manipnet.publisher import Publisher
 from manipnet.requests import Requests
 from manipnet.status import SilenceWatch, second_line
-from manipnet.streams.intake import ListenError, Sink
+from manipnet.streams.intake import ListenError
+from manipnet.streams.keys import read_server_keys
 from manipnet.streams.natnet_client import NatNetBodies
 from manipnet.streams.osc import OscBodies
 from manipnet.streams.zmq_bodies import ZmqBodies
@@ -32,6 +33,7 @@ from manipnet.warm_up import warm_up
 
 SWITCH_INTERVAL_S = 0.001
 """How long a busy thread may keep the interpreter: a receiver must not wait the usual 5 ms for a tick."""
+LOOPBACK = "127.0.0.1"
 WARM_UP_SHAPE = "cube"
 """What to warm up with when there is no prop yet."""
 
@@ -52,12 +54,14 @@ class Server:
     """One server. `say` shows a line to a person and must return at once."""
 
     def __init__(self, config: ServerConfig, say: Callable[[str], None]) -> None:
-        """Load what is configured; listen to nothing yet. Raises `ConfigError`, `BundleError`, `MeshError`."""
+        """Load what is configured; listen to nothing yet. Raises `ConfigError`, `KeyFileError`,
+        `BundleError` and `MeshError`."""
         check(config)
         self._config, self._say = config, say
         self.session = secrets.token_hex(8)
         self.counters, self.timings = Counters(), Timings()
         self._mailbox, self._wardrobe, self._watch = Mailbox(), Wardrobe(), SilenceWatch()
+        self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model)
         self._actors = [self._actor(actor) for actor in config.actors]
         self._shown = 0
@@ -78,44 +82,64 @@ class Server:
 
     def _open(self, opened: ExitStack) -> tuple[TickLoop, dict[str, str]]:
         """Every socket, and the loop between them; `opened` closes them in reverse order."""
-        config = self._config
-        publisher = Publisher(config, self.counters)
+        config, counters = self._config, self.counters
+        publisher = Publisher(config, counters, self._keys)
         opened.callback(publisher.close)
+        control = Control(config.host, config.control_port, self._requests().handlers(), counters, self._keys)
+        opened.callback(control.stop)
+        control.start()
+        addresses = {
+            "hands": publisher.addresses["hands"],
+            "bodies": self._listen(opened, "--input-port", self._zmq_bodies()),
+            "control": control.address,
+            "osc": self._listen(opened, "--osc-port", self._osc_bodies()),
+            "page": publisher.addresses["page"],
+        }
+        if config.natnet is not None:
+            addresses["natnet"] = self._listen(opened, "--natnet", self._motive(*config.natnet))
+        if config.metrics_port is not None:
+            metrics = MetricsPage(LOOPBACK, config.metrics_port, counters, self.timings)
+            opened.callback(metrics.close)
+            addresses["metrics"] = metrics.address
+        return self._loop(publisher), addresses
+
+    def _loop(self, publisher: Publisher) -> TickLoop:
         stages = StageClock(self.timings)
-        loop = TickLoop(
+        return TickLoop(
             self.session,
             self._actors,
             Synthesizer(self._bundle, on_stage=stages.ended),
             stages,
             publisher.publish,
             self._mailbox,
-            FlightRecorder(config.dump_dir or user_log_path("manipnet", appauthor=False)),
+            FlightRecorder(self._config.dump_dir or user_log_path("manipnet", appauthor=False)),
             self.counters,
             self.timings,
         )
-        requests = Requests(
+
+    def _requests(self) -> Requests:
+        return Requests(
             self.session, self._bundle.name, self._actors, self._wardrobe, self._mailbox, self.counters, self.timings
         )
-        control = Control(config.host, config.control_port, requests.handlers(), self.counters)
-        opened.callback(control.stop)
-        control.start()
-        sink, host = self._mailbox.put, config.host
-        bodies = self._listen(opened, "--input-port", ZmqBodies(sink, self.counters, host, config.input_port))
-        osc = self._listen(opened, "--osc-port", OscBodies(sink, self.counters, host, config.osc_port))
-        addresses = {
-            "hands": publisher.addresses["hands"],
-            "bodies": bodies,
-            "control": control.address,
-            "osc": osc,
-            "page": publisher.addresses["page"],
-        }
-        if config.natnet is not None:
-            addresses["natnet"] = self._listen(opened, "--natnet", _motive(config, sink, self.counters))
-        if config.metrics_port is not None:
-            metrics = MetricsPage(host, config.metrics_port, self.counters, self.timings)
-            opened.callback(metrics.close)
-            addresses["metrics"] = metrics.address
-        return loop, addresses
+
+    def _zmq_bodies(self) -> ZmqBodies:
+        config = self._config
+        return ZmqBodies(self._mailbox.put, self.counters, config.host, config.input_port, self._keys)
+
+    def _osc_bodies(self) -> OscBodies:
+        config = self._config
+        return OscBodies(self._mailbox.put, self.counters, config.host, config.osc_port, config.allow or None)
+
+    def _motive(self, host: str, port: int) -> NatNetBodies:
+        return NatNetBodies(
+            self._mailbox.put,
+            self.counters,
+            host,
+            port,
+            multicast=self._config.multicast,
+            interface=self._config.interface,
+            up=self._config.up,
+        )
 
     def _actor(self, config: ActorConfig) -> Actor:
         props = [self._wardrobe.load(thing) for thing in config.objects]
@@ -134,11 +158,3 @@ class Server:
         self._say(second_line(self._actors, self.counters, self.timings, shown - self._shown))
         self._shown = shown
         self._watch.look(self._actors, now_s)
-
-
-def _motive(config: ServerConfig, sink: Sink, counters: Counters) -> NatNetBodies:
-    assert config.natnet is not None
-    host, port = config.natnet
-    return NatNetBodies(
-        sink, counters, host, port, multicast=config.multicast, interface=config.interface, up=config.up
-    )
