@@ -136,7 +136,7 @@ class TickLoop:
         for hand in hands.values():
             self._counters.add("hand_ticks", state=hand.shown.state)
         now_s = time.monotonic()
-        waited_s, spent_s = max(tick.look_ahead_s - TICK_S, 0.0), now_s - tick.waited_for_s
+        waited_s, spent_s = tick.look_ahead_s, now_s - tick.waited_for_s
         latency = Latency(buffer=1e3 * waited_s, total=1e3 * (waited_s + spent_s), **self._stages.last_ms)
         try:
             self._publish(hands_message(self._session, actor, tick, hands, now_s, latency))

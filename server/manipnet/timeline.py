@@ -1,8 +1,7 @@
 """Stream time: frames at any rate in, ticks at exactly 60 per second of the sender's time out.
 
-The tick `k` of a run shows the instant `t0 + k/60`, where `t0` is the run's first frame. Its pose is computed
-from the window centred one tick earlier (the paper's X_{t-1} -> Y_t), so it falls due once samples up to that
-centre plus the look-ahead have arrived. In a silence our own clock carries stream time on, so ticks never
+The tick `k` of a run shows the instant `t0 + k/60`, where `t0` is the run's first frame. It is synthesised
+from the window about that instant, so it falls due once samples up to it plus the look-ahead have arrived. In a silence our own clock carries stream time on, so ticks never
 stop. The clock is always an argument; nothing here waits, sends or reads the time.
 """
 
@@ -17,7 +16,7 @@ import numpy as np
 from manipnet.body_track import TIME_TOLERANCE_S, BodyTrack, Forecast, sample
 from manipnet.forecast import damped_velocity
 from manipnet.geometry import Array
-from manipnet.network.layout import WINDOW_OFFSETS_S
+from manipnet.network.layout import PRESENT, WINDOW_OFFSETS_S
 
 TICK_HZ: Final = 60
 TICK_S: Final = 1.0 / TICK_HZ
@@ -52,7 +51,7 @@ _CLOCK: Final = ""
 
 @dataclass(frozen=True, slots=True)
 class BodyAtTick:
-    """One body as one tick sees it: `window (21, 7)` around the centre, `pose (7,)` at the tick, world frame.
+    """One body as one tick sees it: `window (21, 7)` around it, `pose (7,)` at it, world frame.
 
     `age_s` is the time from its newest tracked sample to the tick.
     """
@@ -79,7 +78,6 @@ class Tick:
     run: int
     index: int
     time_s: float
-    centre_s: float
     look_ahead_s: float
     waited_for_s: float
     """Our clock when what the tick needed had arrived, or when our clock let it fall due."""
@@ -209,8 +207,8 @@ class Timeline:
         return {key: BodyHealth(1.0 / track.interval_s(), track.age_s(clock)) for key, track in tracks}
 
     def _due_s(self, run: Run, index: int) -> float:
-        """Stream time that must have arrived for a tick; the instant it shows is always part of it."""
-        return run.tick_s(index) + max(self._effective_s - TICK_S, 0.0)
+        """Stream time that must have arrived for a tick."""
+        return run.tick_s(index) + self._effective_s
 
     def _reached_s(self, run: Run, now_s: float) -> float:
         now_s += TIME_TOLERANCE_S  # a poll at just the time asked for must not come too early by a rounding
@@ -243,20 +241,19 @@ class Timeline:
 
     def _tick(self, run: Run, index: int, now_s: float) -> Tick:
         time_s, due_s = run.tick_s(index), self._due_s(run, index)
-        centre_s = time_s - TICK_S
         silent = due_s > run.newest_s + TIME_TOLERANCE_S
         tracks = {key: track for key, track in run.tracks.items() if len(track.times)}
         bodies: dict[str, BodyAtTick] = {}
         if tracks:
-            instants = np.append(centre_s + WINDOW_OFFSETS_S, time_s)
+            instants = time_s + WINDOW_OFFSETS_S
             # The future of a sender that has stopped is not forecast: its last pose stands.
             poses = sample(list(tracks.values()), instants, due_s, None if silent else self._forecast)
             bodies = {
-                key: BodyAtTick(rows[:-1], rows[-1], track.age_s(time_s))
+                key: BodyAtTick(rows, rows[PRESENT], track.age_s(time_s))
                 for (key, track), rows in zip(tracks.items(), poses, strict=True)
             }
         waited_for_s = max(run.heard_s, run.heard_s + due_s - run.newest_s)
-        return Tick(run.number, index, time_s, centre_s, self._effective_s, min(waited_for_s, now_s), silent, bodies)
+        return Tick(run.number, index, time_s, self._effective_s, min(waited_for_s, now_s), silent, bodies)
 
     def _slew(self) -> None:
         step = SLEW * TICK_S

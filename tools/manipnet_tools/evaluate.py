@@ -208,5 +208,5 @@ def _left_out(folder: Path, fold: Fold, data: Path) -> Bundle:
         from manipnet_tools import dataset, train
 
         tracks = dataset.load_tracks(data, [case.name for case in fold.train])
-        train.save_bundle(train.train(tracks, train.spans_of(tracks, 1.0), train.TrainConfig()), folder)
+        train.save_bundle(train.train(tracks, train.TrainConfig()), folder)
     return load_bundle(folder)

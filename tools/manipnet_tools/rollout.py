@@ -107,7 +107,7 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
         while (tick := timeline.poll(float(time_s))) is not None:
             ticks.append(tick)
     names = take.bodies.keys()
-    whole = [t for t in ticks if t.centre_s - ticks[0].time_s >= MAX_LOOK_AHEAD_S and names <= t.bodies.keys()]
+    whole = [t for t in ticks if t.time_s - ticks[0].time_s >= MAX_LOOK_AHEAD_S and names <= t.bodies.keys()]
     return Ticks(
         np.array([t.time_s for t in whole]) - float(take.time_s[0]),
         {

@@ -17,12 +17,16 @@ from manipnet.hand.skeleton import DOF_NAMES
 from manipnet.network.bundle import FORMAT
 from manipnet.network.layout import describe
 from manipnet.synthesis import angles_from_outputs
-from manipnet_tools.dataset import HandTrack, Samples, concatenate
+from manipnet_tools.compress import halve_weights
+from manipnet_tools.dataset import HandTrack, Samples, concatenate, load_tracks
 from manipnet_tools.model import Architecture, ManipNet, export_onnx, normalisation
 from manipnet_tools.perturb import captured_samples, self_made_samples
 
 _log = logging.getLogger(__name__)
 
+LICENCE = (
+    "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura"
+)
 LIMIT_MARGIN_RAD = np.radians(7.0)
 FUTURE_FRAMES = 60
 """Windows reach this far: samples end before a span's end, so that no test frame is seen in training."""
@@ -32,22 +36,22 @@ FUTURE_FRAMES = 60
 class TrainConfig:
     """What is trained and how. Defaults are those of the shipped bundles."""
 
-    width: int = 768
+    width: int = 384
     architecture: Architecture = "manipnet"
     carries_pose: bool = True
     """Predict the change of the pose, in units of its own deviation, instead of the pose."""
     hidden: tuple[str, ...] = ()
     """Inputs the network does not see: names of blocks, or `future`."""
-    dropout: float = 0.3
-    rounds: int = 12
+    dropout: float = 0.1
+    rounds: int = 6
     """New samples are made this often."""
-    epochs_per_round: int = 3
-    batch: int = 128
-    learning_rate: float = 6e-4
+    epochs_per_round: int = 6
+    batch: int = 64
+    learning_rate: float = 5e-4
     weight_decay: float = 1e-2
-    average: float = 0.998
+    average: float = 0.999
     """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
-    kept: float = 0.85
+    kept: float = 0.6
     """Share of a pose error that may remain after one tick."""
     blended: float = 1.0
     """Samples at blended poses, per captured frame and round."""
@@ -69,6 +73,8 @@ class Trained:
     limits: Array
     config: TrainConfig
     takes: tuple[str, ...]
+    share: float
+    """Share of each take that was seen, from its start."""
     seconds: float
 
 
@@ -77,21 +83,20 @@ def spans_of(tracks: Sequence[HandTrack], share: float) -> list[tuple[int, int]]
     return [(FUTURE_FRAMES, int(len(track) * share) - FUTURE_FRAMES) for track in tracks]
 
 
-def train(tracks: Sequence[HandTrack], spans: Sequence[tuple[int, int]], config: TrainConfig) -> Trained:
-    """Train on the frames of `spans`, one `(first, last)` per track. Deterministic for a seed and thread count."""
+def train(tracks: Sequence[HandTrack], config: TrainConfig, share: float = 1.0) -> Trained:
+    """Train on the first `share` of each track. Deterministic for a seed, on one thread: with the small batches that
+    train best, a second thread waits more than it works."""
     started = time.monotonic()
+    spans = spans_of(tracks, share)
+    torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     rng = np.random.default_rng(config.seed)
     pool = np.concatenate([track.angles[low:high:4] for track, (low, high) in zip(tracks, spans, strict=True)])
     limits = pose_limits(pool)
     rest = np.clip(pool.mean(axis=0), limits[:, 0], limits[:, 1])
     first = _make(tracks, spans, config, pool, limits, rng, None)
-    model = ManipNet(
-        normalisation(first.inputs, first.outputs, config.carries_pose),
-        config.width,
-        config.dropout,
-        config.architecture,
-    )
+    norm = normalisation(first.inputs, first.outputs, config.carries_pose)
+    model = ManipNet(norm, config.width, config.dropout, config.architecture, config.hidden)
     average = torch.optim.swa_utils.AveragedModel(
         model, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.average)
     )
@@ -112,7 +117,7 @@ def train(tracks: Sequence[HandTrack], spans: Sequence[tuple[int, int]], config:
         )  # fmt: skip
     shipped = average.module if config.average else model
     takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
-    return Trained(shipped.eval(), rest, limits, config, takes, time.monotonic() - started)
+    return Trained(shipped.eval(), rest, limits, config, takes, share, time.monotonic() - started)
 
 
 def pose_limits(angles: Array) -> Array:
@@ -173,7 +178,7 @@ def _epoch(model, average, optimizer, samples: Samples, batch: int, rng) -> floa
 def save_bundle(trained: Trained, folder: Path) -> None:
     """Write `manipnet.onnx` and `bundle.json`."""
     folder.mkdir(parents=True, exist_ok=True)
-    content = export_onnx(trained.model)
+    content = halve_weights(export_onnx(trained.model))
     (folder / "manipnet.onnx").write_bytes(content)
     meta = {
         "format": FORMAT,
@@ -185,9 +190,36 @@ def save_bundle(trained: Trained, folder: Path) -> None:
         "training": {
             **asdict(trained.config),
             "takes": list(trained.takes),
+            "share": trained.share,
             "minutes": round(trained.seconds / 60, 1),
             "date": date.today().isoformat(),
         },
-        "licence": "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura",
+        "licence": LICENCE,
     }
     (folder / "bundle.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class TrainOptions:
+    """Train a model on the published takes.
+
+    Example: manipnet train --data DATA --out models/mine --leave-out mug1
+    """
+
+    data: Path
+    """Folder with `BVH/` and `meshes/`."""
+    out: Path
+    """Folder of the bundle to write."""
+    leave_out: tuple[str, ...] = ()
+    """Takes not to train on."""
+    share: float = 1.0
+    """Train on this share of each take, from its start; 0.8 leaves what `manipnet evaluate` tests as seen."""
+    training: TrainConfig = TrainConfig()
+
+
+def run(options: TrainOptions) -> None:
+    """Train and write the bundle. Raises `ValueError` where there is nothing to train on."""
+    names = [path.name for path in sorted((options.data / "BVH").glob("*")) if path.name not in options.leave_out]
+    if not names:
+        raise ValueError(f"{options.data}: no takes in its BVH folder, or all of them left out")
+    save_bundle(train(load_tracks(options.data, names), options.training, options.share), options.out)
