@@ -1,0 +1,90 @@
+"""Imports point one way: from the command line down to geometry, and never from the runtime to the tools."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SERVER, TOOLS = ROOT / "server" / "manipnet", ROOT / "tools" / "manipnet_tools"
+
+LAYERS = (
+    ("geometry", "kernels", "telemetry"),
+    ("hand", "objects"),
+    ("sensing", "network", "ik"),
+    ("synthesis", "body_track", "forecast", "timeline", "streams", "recording"),
+    ("presence", "output_guard", "config", "rig", "keys"),
+    ("props", "actor", "page"),
+    ("mailbox", "messages", "flight_recorder", "publisher", "control", "status", "metrics", "terminal", "diagnosis"),
+    ("requests", "tick_loop", "doctor"),
+    ("warm_up", "demo"),
+    ("server",),
+    ("cli",),
+)
+"""From the ground up. A module may import its own layer and those below it; a name stands for a folder's modules."""
+
+HEIGHT = {name: height for height, layer in enumerate(LAYERS) for name in layer}
+HEAVY = {"tyro", "viser", "rich", "torch", "mcap", "matplotlib", "onnx", "ray"}
+"""What the tick path must not drag in."""
+
+
+def modules(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*.py") if path.name != "__init__.py")
+
+
+def imported(path: Path) -> set[str]:
+    """Absolute names a file imports, anywhere in it."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            assert node.module is not None
+            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def part(path: Path) -> str:
+    return path.relative_to(SERVER).parts[0].removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", modules(SERVER), ids=lambda path: str(path.relative_to(SERVER)))
+def test_imports_point_down(path: Path) -> None:
+    own = part(path)
+    assert own in HEIGHT, f"{own} has no place in LAYERS: give it one"
+    for name in imported(path):
+        assert not name.startswith("manipnet_tools"), f"{path.name} imports {name}: the runtime must not need the tools"
+        used = name.split(".")[1] if name.startswith("manipnet.") else None
+        if used in HEIGHT:
+            assert HEIGHT[used] <= HEIGHT[own], f"{own} imports {used}, which stands above it"
+
+
+def test_nothing_imports_in_a_circle() -> None:
+    graph = {part(path): set[str]() for path in modules(SERVER)}
+    for path in modules(SERVER):
+        used = {name.split(".")[1] for name in imported(path) if name.startswith("manipnet.")}
+        graph[part(path)] |= (used & graph.keys()) - {part(path)}
+    while graph:
+        free = {name for name, used in graph.items() if not used & graph.keys()}
+        assert free, f"these import each other: {', '.join(sorted(graph))}"
+        for name in free:
+            del graph[name]
+
+
+def test_every_layer_has_its_modules() -> None:
+    missing = HEIGHT.keys() - {part(path) for path in modules(SERVER)}
+    assert missing <= {"page", "recording", "demo"}, f"LAYERS names {missing}, which is gone"
+
+
+@pytest.mark.parametrize("path", modules(SERVER), ids=lambda path: str(path.relative_to(SERVER)))
+def test_the_live_path_stays_light(path: Path) -> None:
+    if part(path) not in ("page", "recording", "demo"):
+        heavy = {name.split(".")[0] for name in imported(path)} & HEAVY
+        assert not heavy, f"{path.name} imports {heavy}"
+
+
+def test_tools_are_a_package_of_their_own() -> None:
+    for path in modules(TOOLS):
+        for name in imported(path):
+            assert name.split(".")[0] != "tests", f"{path.name} imports {name}"
