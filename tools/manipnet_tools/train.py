@@ -46,8 +46,8 @@ class TrainConfig:
     rounds: int = 6
     """New samples are made this often."""
     epochs_per_round: int = 6
-    batch: int = 64
-    learning_rate: float = 5e-4
+    batch: int = 128
+    learning_rate: float = 7e-4
     weight_decay: float = 1e-2
     average: float = 0.999
     """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
