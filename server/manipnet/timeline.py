@@ -1,8 +1,9 @@
 """Stream time: frames at any rate in, ticks at exactly 60 per second of the sender's time out.
 
-The tick `k` of a run shows the instant `t0 + k/60`, where `t0` is the run's first frame. It is synthesised
-from the window about that instant, so it falls due once samples up to it plus the look-ahead have arrived. In a silence our own clock carries stream time on, so ticks never
-stop. The clock is always an argument; nothing here waits, sends or reads the time.
+The tick `k` of a run shows the instant `t0 + k/60`, where `t0` is the run's first frame. It is synthesised from the
+window about that instant, so it falls due once samples up to it plus the look-ahead have arrived. In a silence our own
+clock carries stream time on, so ticks never stop. The clock is always an argument; nothing here waits, sends or reads
+the time.
 """
 
 from collections import deque
