@@ -53,13 +53,13 @@ class TrainConfig:
     """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
     kept: float = 0.6
     """Share of a pose error that may remain after one tick."""
-    blended: float = 1.0
+    blended: float = 0.6
     """Samples at blended poses, per captured frame and round."""
-    self_made: float = 0.5
+    self_made: float = 0.3
     """Samples at the model's own poses, per captured frame and round."""
     roll_out_ticks: int = 40
     warp: float = 0.2
-    captured: float = 0.5
+    captured: float = 0.3
     """Samples at captured poses, per captured frame and round."""
     seed: int = 0
 
