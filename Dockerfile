@@ -1,0 +1,20 @@
+# ManipNet Live: docker build -t manipnet . && docker run --rm -p 5555:5555 manipnet
+FROM python:3.12-slim
+
+RUN useradd --create-home --uid 1000 manipnet
+WORKDIR /opt/manipnet
+COPY pyproject.toml README.md LICENSE ./
+COPY server server
+COPY tools tools
+COPY models models
+RUN pip install --no-cache-dir .
+
+USER manipnet
+WORKDIR /home/manipnet
+ENV PYTHONUNBUFFERED=1
+EXPOSE 5555 5556 5557 39540/udp 8080
+
+# inside a container the loopback is the container's own, so the server listens on all of its addresses; publish only
+# the ports you need and only to networks you trust
+ENTRYPOINT ["manipnet-serve"]
+CMD ["--demo", "--host", "0.0.0.0", "--insecure"]
