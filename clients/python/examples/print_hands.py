@@ -1,0 +1,23 @@
+"""One line a second about what arrives: `python print_hands.py tcp://127.0.0.1:5555`."""
+
+import sys
+import time
+
+import manipnet_client as manipnet
+
+
+def main() -> None:
+    address = sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:5555"
+    with manipnet.Client(address) as client:
+        while True:
+            time.sleep(1.0)
+            stats, hands = client.stats(), client.newest
+            line = f"{stats.state}: {stats.rate_hz:.1f} Hz, {stats.lost} lost"
+            for side in ("left", "right"):
+                if hands and (hand := hands.hand(side)):
+                    line += f"   {side} {hand.state} {hand.object or ''}"
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

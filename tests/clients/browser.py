@@ -1,0 +1,109 @@
+"""A headless Chromium, asked through its DevTools protocol, and a server for the pages it shows."""
+
+import base64
+import functools
+import http.server
+import itertools
+import json
+import os
+import subprocess
+import threading
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from websockets.sync.client import ClientConnection, connect
+
+
+class Page:
+    """One page of the browser."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self._connection, self._ids = connection, itertools.count(1)
+
+    def call(self, method: str, **params: Any) -> dict:
+        """One request of the DevTools protocol, and its answer."""
+        number = next(self._ids)
+        self._connection.send(json.dumps({"id": number, "method": method, "params": params}))
+        while (answer := json.loads(self._connection.recv(timeout=30))).get("id") != number:
+            pass
+        return answer["result"]
+
+    def evaluate(self, expression: str) -> Any:
+        """The value of a JavaScript expression."""
+        return self.call("Runtime.evaluate", expression=expression, returnByValue=True)["result"].get("value")
+
+    def wait_for(self, expression: str, limit_s: float = 30.0) -> Any:
+        """Evaluate until it is true."""
+        give_up = time.monotonic() + limit_s
+        while not (value := self.evaluate(expression)):
+            assert time.monotonic() < give_up, f"never true: {expression}"
+            time.sleep(0.05)
+        return value
+
+    def screenshot(self, path: Path) -> None:
+        """What the page looks like, as PNG."""
+        path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))
+
+
+@contextmanager
+def serving(folder: Path, replaced: dict[str, str] | None = None) -> Iterator[str]:
+    """Serve a folder on loopback; in HTML, texts are replaced."""
+
+    class Handler(http.server.SimpleHTTPRequestHandler):
+        def do_GET(self) -> None:
+            path = Path(self.translate_path(self.path))
+            if path.suffix != ".html":
+                super().do_GET()
+                return
+            text = path.read_text(encoding="utf-8")
+            for old, new in (replaced or {}).items():
+                text = text.replace(old, new)
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(text.encode())
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=folder)) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.05})
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}"
+        server.shutdown()
+        thread.join()
+
+
+@contextmanager
+def browsing(chromium: str, url: str, profile: Path) -> Iterator[Page]:
+    """A Chromium showing a page."""
+    options = ["--headless=new", "--no-sandbox", "--remote-debugging-port=0", f"--user-data-dir={profile}"]
+    options += ["--no-first-run", "--disable-gpu-sandbox", "--enable-unsafe-swiftshader", "--window-size=1280,720"]
+    environment = {**os.environ, "HOME": str(profile)}
+    process = subprocess.Popen(
+        [chromium, *options, url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
+    )
+    try:
+        with connect(_page_address(profile), max_size=None) as connection:
+            yield Page(connection)
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def _page_address(profile: Path) -> str:
+    """The page's DevTools address, once the browser has told its port."""
+    told, give_up = profile / "DevToolsActivePort", time.monotonic() + 30
+    while True:
+        assert time.monotonic() < give_up, "Chromium did not start"
+        time.sleep(0.05)
+        if not told.exists() or not (lines := told.read_text().split()):
+            continue
+        with urllib.request.urlopen(f"http://127.0.0.1:{lines[0]}/json/list") as answer:
+            pages = [p for p in json.load(answer) if p["type"] == "page" and p["url"].startswith("http")]
+        if pages:
+            return pages[0]["webSocketDebuggerUrl"]

@@ -1,0 +1,48 @@
+"""The web client in a real browser: the example page against a live server that goes and comes back."""
+
+import shutil
+
+import pytest
+from browser import browsing, serving
+from support import CLIENTS, ROOT, need, publishing
+
+CDN = "https://cdn.jsdelivr.net/npm/three@0.170.0"
+STUB = ROOT / "tests" / "clients" / "web" / "three-stub.js"
+
+
+@pytest.fixture
+def pages(tmp_path):
+    """The web client's folder with a stub in three.js's place: tests ask nobody on the network."""
+    folder = tmp_path / "web"
+    shutil.copytree(CLIENTS / "web", folder)
+    for path in ("three/build/three.module.js", "three/examples/jsm/controls/OrbitControls.js"):
+        (folder / path).parent.mkdir(parents=True)
+        shutil.copy(STUB, folder / path)
+    with serving(folder, {CDN: "/three"}) as address:
+        yield address
+
+
+def test_example_page_shows_a_server_that_goes_and_comes_back(pages, tmp_path):
+    (chromium,) = need("chromium")
+    status = "document.getElementById('status').textContent"
+    with publishing("--session", "a") as (process, _, websocket):
+        url = f"{pages}/example.html?server={websocket}"
+        with browsing(chromium, url, tmp_path / "profile") as page:
+            text = page.wait_for(f"{status}.includes(' 0 lost') && {status}")
+            assert text.startswith("connected")
+            assert "left: live, cube" in text
+            page.wait_for("Number(document.body.dataset.frames) > 10")
+            process.kill()
+            process.wait()
+            page.wait_for(f"{status}.startsWith('reconnecting')")
+            port = websocket.rpartition(":")[2]
+            with publishing("--session", "b", "--websocket-port", port):
+                page.wait_for(f"{status}.startsWith('connected')")
+
+
+def test_joint_names_are_webxr_names():
+    from manipnet.hand.joint_sets import WEBXR_JOINT_NAMES
+
+    text = (CLIENTS / "web" / "layout.js").read_text(encoding="utf-8")
+    for name in WEBXR_JOINT_NAMES:
+        assert f'"{name}"' in text

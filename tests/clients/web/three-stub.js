@@ -1,0 +1,25 @@
+// What the example page uses of three.js, without drawing: it lets the page run where there is no network.
+class Anything {
+  constructor() {
+    return new Proxy(function () {}, {
+      get: (target, key) => (key === Symbol.toPrimitive ? () => 0 : (target[key] ??= new Anything())),
+      set: (target, key, value) => ((target[key] = value), true),
+      apply: () => new Anything(),
+    });
+  }
+}
+
+export const [Scene, HemisphereLight, GridHelper, PerspectiveCamera, MeshStandardMaterial, InstancedMesh] = Array(6).fill(Anything);
+export const [SphereGeometry, BufferGeometry, BufferAttribute, LineSegments, LineBasicMaterial] = Array(5).fill(Anything);
+export const [Group, Matrix4, AxesHelper, Vector3, OrbitControls] = Array(5).fill(Anything);
+
+export class WebGLRenderer {
+  domElement = document.createElement("canvas");
+  frames = 0;
+  setPixelRatio() {}
+  setSize() {}
+  setClearColor() {}
+  render() {
+    document.body.dataset.frames = ++this.frames;
+  }
+}
