@@ -23,9 +23,9 @@ from manipnet_tools.takes import Take, TakeError, read_take
 class SynthesizeOptions:
     """Write the fingers of both hands of a take to a file, in world coordinates at 60 Hz."""
 
-    take: tyro.conf.Positional[Path]
+    take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
     """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
-    mesh: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=FILE")]
+    mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")]
     """Objects of the take that are handled, each with its mesh in metres."""
     out: Path
     """The file to write, .npz."""

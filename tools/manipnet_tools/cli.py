@@ -1,0 +1,102 @@
+"""`manipnet VERB`: one command for everything. Each verb's libraries load only when it is called."""
+
+import importlib
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from manipnet import __version__
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A verb and who does it: `module.main(argv)`, or `module.run(options)` where a class of options is named."""
+
+    summary: str
+    module: str
+    options: str | None = None
+
+
+VERBS = {
+    "serve": Verb("fingers live from tracked wrists and props (same as manipnet-serve)", "manipnet.cli"),
+    "replay": Verb("send a take to a server, as the tracker would", "manipnet_tools.replay", "ReplayOptions"),
+    "record": Verb("write what is tracked and synthesised to a recording", "manipnet_tools.record", "RecordOptions"),
+    "recover": Verb("mend a recording that was cut off", "manipnet_tools.recover", "RecoverOptions"),
+    "synthesize": Verb("fingers for a take, offline", "manipnet_tools.synthesize", "SynthesizeOptions"),
+    "evaluate": Verb("judge models on captured takes", "manipnet_tools.evaluate", "EvaluateOptions"),
+    "train": Verb("train a model on captured takes", "manipnet_tools.train", "TrainOptions"),
+    "bench": Verb("measure how long a tick takes, stage by stage", "manipnet_tools.bench"),
+    "doctor": Verb("say why no tracked bodies arrive", "manipnet.doctor"),
+    "keys": Verb("make and list the keys that let clients in over the network", "manipnet.keys"),
+}
+
+EXAMPLES = """examples:
+  manipnet serve --demo
+  manipnet serve --mesh Box=mug.obj --look-ahead 0.1
+  manipnet replay takes/mug1 --to tcp://127.0.0.1:5556 --loop
+  manipnet record --out take.mcap
+  manipnet synthesize takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz
+  manipnet evaluate --data DATASET --protocol seen
+  manipnet train --data DATASET --out models/mine
+  manipnet doctor --rig stage.toml"""
+
+EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster"}
+"""Libraries that do not come with a plain installation, and what to install to have them."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Do what the verb says; the exit status: 0, 1 for what cannot be done, 2 for a mistyped command."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(help_text())
+        return 0 if arguments else 2
+    if arguments[0] == "--version":
+        print(f"manipnet {__version__}")
+        return 0
+    name, *rest = arguments
+    if name not in VERBS:
+        print(f"manipnet: no verb {name!r}; verbs are {', '.join(VERBS)}", file=sys.stderr)
+        return 2
+    return _guarded(name, rest)
+
+
+def help_text() -> str:
+    """What `manipnet --help` prints."""
+    width = max(map(len, VERBS))
+    verbs = "\n".join(f"  {name:{width}}  {verb.summary}" for name, verb in VERBS.items())
+    return (
+        "usage: manipnet VERB [options]      (manipnet VERB --help: the options of a verb)\n\n"
+        f"Fingers for tracked wrists and props.\n\nverbs:\n{verbs}\n\n{EXAMPLES}"
+    )
+
+
+def _guarded(name: str, rest: list[str]) -> int:
+    """Run a verb; what a user can mend becomes one line instead of a traceback."""
+    try:
+        return _run(name, VERBS[name], rest)
+    except KeyboardInterrupt:
+        return 130
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        remedy = f"{error.name} is not installed: python -m pip install 'manipnet-live[{EXTRAS[error.name]}]'"
+        print(f"manipnet {name}: {remedy}", file=sys.stderr)
+    except (ValueError, OSError) as error:
+        if isinstance(error, ValueError) and not type(error).__module__.startswith("manipnet"):
+            raise  # a mistake of ours: the traceback is what is needed
+        print(f"manipnet {name}: {error}", file=sys.stderr)
+    return 1
+
+
+def _run(name: str, verb: Verb, rest: list[str]) -> int:
+    module = importlib.import_module(verb.module)
+    if verb.options is None:
+        return module.main(rest) or 0
+    import tyro
+
+    module.run(tyro.cli(getattr(module, verb.options), prog=f"manipnet {name}", args=rest))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
