@@ -35,6 +35,8 @@ Side = Literal["left", "right"]
 SolverName = Literal["least_squares", "ccd", "none"]
 SOLVERS: tuple[SolverName, ...] = ("least_squares", "ccd", "none")
 
+CORRECTION_SHARE = 0.5
+"""How much of the way to a new correction a tick goes: half of it in one tick."""
 ABSENT_HAND_M = 0.45
 """Distance at which a hand that is not tracked is assumed to be."""
 
@@ -64,6 +66,8 @@ class HandState:
     """`(22, 3)` metres."""
     rotations: Array
     """`(17, 3, 3)`."""
+    correction: Array
+    """`(20,)` what inverse kinematics added to the network's angles, radians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +83,7 @@ class HandStep:
 
 def state_of(angles: Array) -> HandState:
     """The state of a hand posed by `angles (20,)`."""
-    return HandState(angles, *forward_kinematics(angles))
+    return HandState(angles, *forward_kinematics(angles), np.zeros(len(angles)))
 
 
 def hand_to_world(
@@ -150,14 +154,14 @@ class Synthesizer:
         steps: list[HandStep | None] = [None] * len(scenes)
         order = np.concatenate([members for _, members in groups])
         for output, index in zip(outputs, order, strict=True):
-            steps[index] = self._pose(output, scenes[index], windows, index)
+            steps[index] = self._pose(output, scenes[index], states[index], windows, index)
         self._on_stage("ik")
         return [step for step in steps if step is not None]
 
-    def _pose(self, output: Array, scene: HandScene, windows: Windows, index: int) -> HandStep:
+    def _pose(self, output: Array, scene: HandScene, state: HandState, windows: Windows, index: int) -> HandStep:
         shape, limits = scene.shape, self._bundle.limits
         angles, positions, rotations = np.empty(20), np.empty((22, 3)), np.empty((17, 3, 3))
-        raw_positions, distances = np.empty((22, 3)), np.empty(22)
+        raw_positions, distances, correction = np.empty((22, 3)), np.empty(22), state.correction.copy()
         _pose_kernel(
             output,
             limits,
@@ -174,8 +178,9 @@ class Synthesizer:
             rotations,
             raw_positions,
             distances,
+            correction,
         )
-        return HandStep(HandState(angles, positions, rotations), distances, raw_positions)
+        return HandStep(HandState(angles, positions, rotations, correction), distances, raw_positions)
 
 
 def _by_shape(scenes: Sequence[HandScene]) -> list[tuple[Shape, np.ndarray]]:
@@ -213,7 +218,7 @@ def rotations_from_axes_into(output, rotations):
 @njit(cache=True, nogil=True)
 def _pose_kernel(
     output, limits, solver, bvh, field, exact_within_m, wrist, obj, mirrored, scale,
-    angles, positions, rotations, raw_positions, distances,
+    angles, positions, rotations, raw_positions, distances, correction,
 ):  # fmt: skip
     axes, targets = np.empty((20, 3)), np.empty((22, 3))
     rotations_from_axes_into(output, rotations)
@@ -227,7 +232,10 @@ def _pose_kernel(
     for j in range(22):
         distances[j] = min(max(output[_OUT_DISTANCES + j], 0.0), OUTPUT_DISTANCE_MAX_M)
     forward_kinematics_into(angles, raw_positions, rotations, axes)
-    if solver != 2:
+    if solver == 2:
+        correction[:] = 0.0
+    else:
+        predicted = angles.copy()
         rotation, translation = np.empty((3, 3)), np.empty(3)
         object_from_wrist(wrist, obj, mirrored, rotation, translation)
         place_targets(
@@ -238,6 +246,10 @@ def _pose_kernel(
             solve_ccd(angles, targets, limits)
         else:
             solve_least_squares(angles, targets, distances, limits, field, rotation, translation, scale)
+        # corrections fade in and out over a few ticks instead of popping
+        for dof in range(20):
+            correction[dof] += CORRECTION_SHARE * (angles[dof] - predicted[dof] - correction[dof])
+            angles[dof] = clamp(predicted[dof] + correction[dof], limits, dof)
     forward_kinematics_into(angles, positions, rotations, axes)
 
 
