@@ -1,5 +1,6 @@
 """What is shown of a hand while its tracking comes and goes: live, hold, rest, and never a jump between them."""
 
+import math
 from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -18,6 +19,9 @@ REST_AFTER_S: Final = 0.5
 RETURN_HALF_LIFE_S: Final = 0.06
 """Back to live: nine tenths of the way in 0.2 s."""
 REST_HALF_LIFE_S: Final = 0.2
+
+CLOSED: Final = 1e-6
+"""A gap below a micrometre or a microradian is none."""
 
 _TOLERANCE_S: Final = 1e-6
 
@@ -45,18 +49,23 @@ class Ease:
     def __init__(self, size: int) -> None:
         self.gap = np.zeros(size)
         self._speed = np.zeros(size)
+        self._open = False
 
     def open(self, gap: Array) -> None:
         """Start from a new gap, at rest."""
-        self.gap, self._speed = gap, np.zeros_like(gap)
+        self.gap, self._speed, self._open = gap, np.zeros_like(gap), True
 
     def close(self, dt_s: float, half_life_s: float) -> Array:
         """The gap `dt_s` later; `half_life_s` is about the time in which half of it closes."""
-        stiffness = 2.0 * np.log(2.0) / half_life_s
+        if not self._open:
+            return self.gap
+        stiffness = 2.0 * math.log(2.0) / half_life_s
         pull = self._speed + stiffness * self.gap
-        decay = np.exp(-stiffness * dt_s)
+        decay = math.exp(-stiffness * dt_s)
         self.gap = decay * (self.gap + pull * dt_s)
         self._speed = decay * (self._speed - stiffness * pull * dt_s)
+        if np.abs(self.gap).max() < CLOSED:
+            self.gap, self._open = np.zeros_like(self.gap), False
         return self.gap
 
 
@@ -113,4 +122,6 @@ class Presence:
             turn = quat_log(quat_multiply(shown[3:], quat_conjugate(wrist[3:])))
             self._wrist.open(np.concatenate([shown[:3] - wrist[:3], turn]))
         gap = self._wrist.close(dt_s, RETURN_HALF_LIFE_S)
+        if not gap.any():
+            return wrist
         return np.concatenate([wrist[:3] + gap[:3], quat_multiply(quat_exp(gap[3:]), wrist[3:])])
