@@ -1,0 +1,160 @@
+"""Counters with closed labels, timings, the log that cannot be flooded, and where frames wait."""
+
+import ast
+import logging
+import threading
+from pathlib import Path
+
+import pytest
+
+from manipnet.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
+from manipnet.status import SilenceWatch
+from manipnet.streams.bodies import BodyFrame
+from manipnet.telemetry import LABELS, Counters, RateLimit, Timings
+from manipnet.timeline import BodyHealth
+
+SOURCES = sorted((Path(__file__).parents[1] / "server").rglob("*.py"))
+
+
+def test_counters_count_by_label_from_any_thread() -> None:
+    counters = Counters()
+    threads = [
+        threading.Thread(target=lambda: [counters.add("frames_in", source="osc") for _ in range(1000)])
+        for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert counters.snapshot() == {"frames_in": {"osc": 4000}}
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [("frames", {"source": "osc"}), ("frames_in", {"source": "pigeon"}), ("frames_in", {"by": "osc"})],
+)
+def test_a_counter_or_label_that_is_not_declared_is_an_error(name: str, label: dict[str, str]) -> None:
+    with pytest.raises(KeyError):
+        Counters().add(name, **label)
+
+
+def test_every_count_in_the_source_is_declared() -> None:
+    """A label that is misspelt in a rare branch would raise there, so all literals are checked here."""
+    found = 0
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "add"):
+                continue
+            if not (node.args and isinstance(node.args[0], ast.Constant) and isinstance(node.args[0].value, str)):
+                continue
+            label, values = LABELS[node.args[0].value]
+            (keyword,) = node.keywords
+            assert keyword.arg == label, f"{path.name}:{node.lineno}"
+            if isinstance(keyword.value, ast.Constant):
+                assert keyword.value.value in values, f"{path.name}:{node.lineno}"
+            found += 1
+    assert found > 10
+
+
+def test_timings_keep_all_and_the_newest() -> None:
+    timings = Timings(window=100)
+    for milliseconds in range(1, 1001):
+        timings.record("total", milliseconds * 1e-3)
+    assert timings.overall("total", 50.0, 100.0) == pytest.approx([0.5, 1.0], rel=2e-3)
+    assert timings.recent("total", 0.0, 100.0) == pytest.approx([0.901, 1.0])
+    assert timings.recent("total", 50.0) == [0.0], "read once"
+    assert timings.totals("total") == (1000, pytest.approx(500.5))
+
+
+def record(text: str, level: int = logging.WARNING) -> logging.LogRecord:
+    return logging.LogRecord("manipnet", level, __file__, 1, text, (), None)
+
+
+def test_a_line_that_repeats_is_held_back_and_summed_up() -> None:
+    now = [0.0]
+    limit = RateLimit(lambda: now[0], interval_s=5.0)
+    shown = []
+    for second in range(12):
+        now[0] = float(second)
+        line = record("lost a frame")
+        if limit.filter(line):
+            shown.append(line.getMessage())
+    assert shown == ["lost a frame", "lost a frame (and 4 more like it)", "lost a frame (and 4 more like it)"]
+    assert limit.filter(record("another"))
+    assert all(limit.filter(record("news", logging.INFO)) for _ in range(3))
+
+
+def a_frame(t_s: float) -> BodyFrame:
+    return BodyFrame(t_s, None, (), t_s, "zmq")
+
+
+def test_the_mailbox_keeps_the_newest_frames_and_counts_the_others() -> None:
+    mailbox = Mailbox()
+    for i in range(MAX_FRAMES + 7):
+        mailbox.put(a_frame(float(i)))
+    frames = mailbox.wait(0.0)
+    assert [frame.t_s for frame in frames] == [float(i) for i in range(7, MAX_FRAMES + 7)]
+    assert mailbox.dropped == 7
+    assert mailbox.wait(0.0) == []
+
+
+def test_a_question_is_answered_on_the_tick_thread() -> None:
+    mailbox, answers = Mailbox(), []
+    asking = threading.Thread(target=lambda: answers.append(mailbox.ask(threading.get_ident, timeout_s=20.0)))
+    asking.start()
+    while not answers:
+        mailbox.wait(0.1)
+        if not asking.is_alive():
+            break
+    asking.join()
+    assert answers == [threading.get_ident()]
+
+
+def test_an_error_in_a_question_goes_to_who_asked() -> None:
+    mailbox, errors = Mailbox(), []
+
+    def ask() -> None:
+        with pytest.raises(ZeroDivisionError):
+            mailbox.ask(lambda: 1 / 0, timeout_s=20.0)
+        errors.append(True)
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    while asking.is_alive():
+        mailbox.wait(0.01)
+    assert errors == [True]
+
+
+def test_questions_nobody_answers_are_given_up_and_bounded() -> None:
+    mailbox = Mailbox()
+    for _ in range(MAX_REQUESTS):
+        with pytest.raises(BusyError, match="did not answer"):
+            mailbox.ask(lambda: None, timeout_s=0.0)
+    with pytest.raises(BusyError, match="too many requests"):
+        mailbox.ask(lambda: None, timeout_s=0.0)
+    assert mailbox.wait(0.0) == []
+    with pytest.raises(BusyError, match="did not answer"):
+        mailbox.ask(lambda: None, timeout_s=0.0)
+
+
+class FakeActor:
+    """What the watch looks at: a name and the age of one body."""
+
+    def __init__(self) -> None:
+        self.config = type("Config", (), {"name": "ann"})
+        self.age_s = 0.0
+
+    def health(self, now_s: float) -> dict[str, BodyHealth]:
+        return {"left_wrist": BodyHealth(120.0, self.age_s)}
+
+
+def test_silence_is_said_once_at_3_and_at_10_seconds_and_when_it_ends(caplog: pytest.LogCaptureFixture) -> None:
+    watch, actor = SilenceWatch(), FakeActor()
+    for age_s in (float("inf"), 0.1, 1.0, 2.0, 3.5, 4.0, 9.0, 10.5, 11.0, 0.1, 0.2):
+        actor.age_s = age_s
+        watch.look([actor], 0.0)  # type: ignore[list-item]
+    assert [(r.levelname, r.getMessage()) for r in caplog.records] == [
+        ("WARNING", "ann: left_wrist has not been tracked for 4 s"),
+        ("ERROR", "ann: left_wrist has not been tracked for 10 s"),
+        ("WARNING", "ann: left_wrist is tracked again"),
+    ]
