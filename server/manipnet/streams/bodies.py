@@ -83,6 +83,17 @@ def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
     return BodyFrame(t_s, frame, bodies, t_received_s, source)
 
 
+def bodies_map(frame: BodyFrame) -> dict[str, Any]:
+    """Inverse of `parse_bodies`, before it is packed as msgpack or JSON."""
+    return {"t": frame.t_s, "frame": frame.frame, "bodies": [_sample_map(body) for body in frame.bodies]}
+
+
+def _sample_map(body: BodySample) -> dict[str, Any]:
+    keys = {"id": body.id, "name": body.name}
+    pose = {"p": list(body.p), "q": list(body.q), "tracked": body.tracked}
+    return {key: value for key, value in keys.items() if value is not None} | pose
+
+
 def make_sample(
     id: int | None, name: str | None, p: tuple[float, ...], q: tuple[float, ...], tracked: bool
 ) -> BodySample:
