@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from manipnet.kernels import COMPILED
+
 ROOT = Path(__file__).parents[1]
 SERVER, TOOLS = ROOT / "server" / "manipnet", ROOT / "tools" / "manipnet_tools"
 
@@ -82,6 +84,14 @@ def test_the_live_path_stays_light(path: Path) -> None:
     if part(path) not in ("page", "recording", "demo"):
         heavy = {name.split(".")[0] for name in imported(path)} & HEAVY
         assert not heavy, f"{path.name} imports {heavy}"
+
+
+@pytest.mark.parametrize("path", modules(SERVER), ids=lambda path: str(path.relative_to(SERVER)))
+def test_compiled_code_is_where_the_cache_looks_for_changes(path: Path) -> None:
+    parts = {name.removesuffix(".py") for name in COMPILED}
+    if "manipnet.kernels" in imported(path):
+        used = {name.split(".")[1] for name in imported(path) if name.startswith("manipnet.")}
+        assert used - {"kernels"} | {part(path)} <= parts
 
 
 def test_tools_are_a_package_of_their_own() -> None:

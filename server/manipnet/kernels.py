@@ -13,9 +13,13 @@ from pathlib import Path
 
 import numba
 from numba import njit, prange
+from numba.core import config
 from platformdirs import user_cache_dir
 
 __all__ = ["njit", "prange"]
+
+COMPILED = ("geometry.py", "hand", "objects", "sensing", "network", "ik", "synthesis.py", "body_track.py")
+"""Where compiled functions are, and the constants they are compiled with; nothing else is part of the state."""
 
 _KEEP_S = 7 * 86400.0
 
@@ -23,7 +27,8 @@ _KEEP_S = 7 * 86400.0
 def _package_state() -> str:
     package = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
-    for path in sorted(p for p in package.rglob("*") if p.suffix in (".py", ".npz")):
+    files = (p for part in COMPILED for p in (package / part, *(package / part).rglob("*")))
+    for path in sorted(p for p in files if p.suffix in (".py", ".npz")):
         stat = path.stat()
         digest.update(f"{path.relative_to(package)} {stat.st_size} {stat.st_mtime_ns}".encode())
     return digest.hexdigest()[:16]
@@ -42,7 +47,7 @@ def _use_own_cache() -> None:
                 shutil.rmtree(old, ignore_errors=True)
     except OSError:
         return  # numba then falls back to the folders it knows
-    numba.config.CACHE_DIR = str(folder)
+    config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]: set at run time
 
 
 _use_own_cache()
