@@ -44,6 +44,7 @@ def write_tiny_bundle(folder: Path, spread: float = 1e-3) -> Path:
         "layout": describe(),
         "dofs": list(DOF_NAMES),
         "rest_angles_rad": (DOF_LIMITS_RAD @ [0.7, 0.3]).tolist(),
+        "response": 0.5,
         "limits_rad": DOF_LIMITS_RAD.tolist(),
         "model_sha256": hashlib.sha256(content).hexdigest(),
     }

@@ -86,9 +86,7 @@ def state_of(angles: Array) -> HandState:
     return HandState(angles, *forward_kinematics(angles), np.zeros(len(angles)))
 
 
-def hand_to_world(
-    side: Side, T_world_wrist: Array, positions: Array, rotations: Array
-) -> tuple[Array, Array]:
+def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations: Array) -> tuple[Array, Array]:
     """Carry poses from the canonical wrist frame to the world, mirroring a left hand back.
 
     `T_world_wrist (..., 7)` is the real wrist, `positions (..., 22, 3)`, `rotations (..., 17, 3, 3)`. Returns
@@ -164,6 +162,8 @@ class Synthesizer:
         raw_positions, distances, correction = np.empty((22, 3)), np.empty(22), state.correction.copy()
         _pose_kernel(
             output,
+            state.angles,
+            self._bundle.response,
             limits,
             SOLVERS.index(self._solver),
             shape.bvh,
@@ -217,7 +217,7 @@ def rotations_from_axes_into(output, rotations):
 
 @njit(cache=True, nogil=True)
 def _pose_kernel(
-    output, limits, solver, bvh, field, exact_within_m, wrist, obj, mirrored, scale,
+    output, before, response, limits, solver, bvh, field, exact_within_m, wrist, obj, mirrored, scale,
     angles, positions, rotations, raw_positions, distances, correction,
 ):  # fmt: skip
     axes, targets = np.empty((20, 3)), np.empty((22, 3))
@@ -228,7 +228,7 @@ def _pose_kernel(
             rotations[0, i, j] = 1.0 if i == j else 0.0
     angles_from_rotations_into(rotations, angles)
     for dof in range(20):
-        angles[dof] = clamp(angles[dof], limits, dof)
+        angles[dof] = clamp(before[dof] + response * (angles[dof] - before[dof]), limits, dof)
     for j in range(22):
         distances[j] = min(max(output[_OUT_DISTANCES + j], 0.0), OUTPUT_DISTANCE_MAX_M)
     forward_kinematics_into(angles, raw_positions, rotations, axes)
@@ -240,7 +240,7 @@ def _pose_kernel(
         object_from_wrist(wrist, obj, mirrored, rotation, translation)
         place_targets(
             bvh, field, rotation, translation, scale, exact_within_m,
-            output[:66].copy().reshape((22, 3)), distances, targets,
+            raw_positions, distances, targets,
         )  # fmt: skip
         if solver == 1:
             solve_ccd(angles, targets, limits)

@@ -54,6 +54,7 @@ def still_model(tmp_path_factory) -> Path:
         "dofs": list(DOF_NAMES),
         "rest_angles_rad": [0.0] * 20,
         "limits_rad": DOF_LIMITS_RAD.tolist(),
+        "response": 0.5,
         "model_sha256": hashlib.sha256(content).hexdigest(),
     }
     (folder / "bundle.json").write_text(json.dumps(meta))

@@ -6,12 +6,11 @@ what made perturbed training jitter.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.network.features import features
 from manipnet_tools.dataset import TICK_FRAMES, HandTrack, Samples, concatenate, samples_at
 
 Policy = Callable[[np.ndarray], Array]
@@ -33,8 +32,20 @@ def blended_poses(captured: Array, pool: Array, rng: np.random.Generator) -> Arr
     return captured + blend * (other - captured) + rng.normal(0.0, 0.02, captured.shape)
 
 
+@dataclass(frozen=True)
+class Lesson:
+    """What the network is to answer."""
+
+    kept: float
+    """Share of a pose error that may remain after one tick."""
+    lead_frames: float
+    """How far ahead of the tick the answered pose is, captured frames: what the smoothing after the network lags."""
+    response: float
+    """Share of the way to the answer that a hand goes in one tick."""
+
+
 def captured_samples(
-    track: HandTrack, frames: np.ndarray, pool: Array | None, kept: float, limits: Array, rng: np.random.Generator,
+    track: HandTrack, frames: np.ndarray, pool: Array | None, lesson: Lesson, limits: Array, rng: np.random.Generator,
     warp: float = 0.0,
 ) -> Samples:  # fmt: skip
     """Samples at `frames`, seen from the captured pose before or, with a `pool`, from poses blended toward it.
@@ -42,17 +53,18 @@ def captured_samples(
     `warp` plays time faster or slower by a factor up to `exp(±warp)`.
     """
     speed = np.exp(rng.uniform(-warp, warp, len(frames))) if warp else np.ones(len(frames))
-    captured_before, captured = track.angles_at(frames - TICK_FRAMES * speed), track.angles[frames]
+    captured_before = track.angles_at(frames - TICK_FRAMES * speed)
+    captured = track.angles_at(frames + lesson.lead_frames * speed)
     before = captured_before
     if pool is not None:
         before = np.clip(blended_poses(captured_before, pool, rng), limits[:, 0], limits[:, 1])
-    after = led_back(before, captured_before, captured, kept)
+    after = led_back(before, captured_before, captured, lesson.kept)
     return samples_at(track, frames, before, after, track.windows(frames, speed) if warp else None)
 
 
 def self_made_samples(
     tracks: Sequence[HandTrack], spans: Sequence[tuple[int, int]], policy: Policy, starts: int, ticks: int,
-    kept: float, pool: Array, limits: Array, rng: np.random.Generator,
+    lesson: Lesson, pool: Array, limits: Array, rng: np.random.Generator,
 ) -> Samples:  # fmt: skip
     """Samples along roll-outs of the model from `starts` random poses per track, `ticks` long (Ross et al. 2011)."""
     frames = [rng.integers(low, high - TICK_FRAMES * ticks, starts) for low, high in spans]
@@ -64,20 +76,13 @@ def self_made_samples(
     parts: list[Samples] = []
     for _ in range(ticks):
         step = [
-            samples_at(t, at, s, led_back(s, t.angles_at(at - TICK_FRAMES), t.angles_at(at), kept))
+            samples_at(
+                t, at, s, led_back(s, t.angles_at(at - TICK_FRAMES), t.angles_at(at + lesson.lead_frames), lesson.kept)
+            )
             for t, at, s in zip(tracks, frames, states, strict=True)
         ]
         parts += step
-        states = np.split(policy(np.concatenate([p.inputs for p in step])), len(tracks))
+        answers = np.split(policy(np.concatenate([p.inputs for p in step])), len(tracks))
+        states = [s + lesson.response * (a - s) for s, a in zip(states, answers, strict=True)]
         frames = [at + TICK_FRAMES for at in frames]
     return concatenate(parts)
-
-
-def roll_out_angles(track: HandTrack, frames: np.ndarray, policy: Policy, start: Array) -> Array:
-    """Angles `(T, 20)` of a roll-out without inverse kinematics over 60 Hz `frames (T,)`, from pose `start (20,)`."""
-    windows, pose, poses = track.windows(frames), start[None], []
-    for i in range(len(frames)):
-        here = type(windows)(*(values[i : i + 1] for values in windows))
-        pose = policy(features(track.shape, here, *forward_kinematics(pose)))
-        poses.append(pose[0])
-    return np.stack(poses)

@@ -18,15 +18,13 @@ from manipnet.network.bundle import FORMAT
 from manipnet.network.layout import describe
 from manipnet.synthesis import angles_from_outputs
 from manipnet_tools.compress import halve_weights
-from manipnet_tools.dataset import HandTrack, Samples, concatenate, load_tracks
+from manipnet_tools.dataset import TICK_FRAMES, HandTrack, Samples, concatenate, load_tracks
 from manipnet_tools.model import Architecture, ManipNet, export_onnx, normalisation
-from manipnet_tools.perturb import captured_samples, self_made_samples
+from manipnet_tools.perturb import Lesson, captured_samples, self_made_samples
 
 _log = logging.getLogger(__name__)
 
-LICENCE = (
-    "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura"
-)
+LICENCE = "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura"
 LIMIT_MARGIN_RAD = np.radians(7.0)
 FUTURE_FRAMES = 60
 """Windows reach this far: samples end before a span's end, so that no test frame is seen in training."""
@@ -38,11 +36,11 @@ class TrainConfig:
 
     width: int = 384
     architecture: Architecture = "manipnet"
-    carries_pose: bool = True
+    carries_pose: bool = False
     """Predict the change of the pose, in units of its own deviation, instead of the pose."""
     hidden: tuple[str, ...] = ()
     """Inputs the network does not see: names of blocks, or `future`."""
-    dropout: float = 0.1
+    dropout: float = 0.3
     rounds: int = 6
     """New samples are made this often."""
     epochs_per_round: int = 6
@@ -51,11 +49,13 @@ class TrainConfig:
     weight_decay: float = 1e-2
     average: float = 0.999
     """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
-    kept: float = 0.6
+    kept: float = 0.0
     """Share of a pose error that may remain after one tick."""
+    response: float = 0.4
+    """Share of the way to the answer that a hand goes in one tick; the answer leads by what that lags."""
     blended: float = 0.6
     """Samples at blended poses, per captured frame and round."""
-    self_made: float = 0.3
+    self_made: float = 0.4
     """Samples at the model's own poses, per captured frame and round."""
     roll_out_ticks: int = 40
     warp: float = 0.2
@@ -140,18 +140,18 @@ def policy_of(model: ManipNet, limits: Array):
 
 def _make(tracks, spans, config: TrainConfig, pool: Array, limits: Array, rng, policy) -> Samples:
     """One round's samples: captured, blended and, with a policy, self-made poses."""
+    lag_ticks = (1.0 - config.response) / config.response
+    lesson = Lesson(config.kept, TICK_FRAMES * lag_ticks, config.response)
     parts = []
     for track, (low, high) in zip(tracks, spans, strict=True):
         for share, towards in ((config.captured, None), (config.blended, pool)):
             if share:
                 frames = rng.integers(low, high, int(share * (high - low)))
-                parts.append(captured_samples(track, frames, towards, config.kept, limits, rng, config.warp))
+                parts.append(captured_samples(track, frames, towards, lesson, limits, rng, config.warp))
     if policy is not None and config.self_made:
         wanted = config.self_made * np.mean([high - low for low, high in spans])
         starts = max(int(wanted / config.roll_out_ticks), 1)
-        parts.append(
-            self_made_samples(tracks, spans, policy, starts, config.roll_out_ticks, config.kept, pool, limits, rng)
-        )
+        parts.append(self_made_samples(tracks, spans, policy, starts, config.roll_out_ticks, lesson, pool, limits, rng))
     return concatenate(parts)
 
 
@@ -185,6 +185,7 @@ def save_bundle(trained: Trained, folder: Path) -> None:
         "layout": describe(),
         "dofs": list(DOF_NAMES),
         "rest_angles_rad": [round(float(a), 6) for a in trained.rest_angles],
+        "response": trained.config.response,
         "limits_rad": np.round(trained.limits, 6).tolist(),
         "model_sha256": hashlib.sha256(content).hexdigest(),
         "training": {

@@ -30,6 +30,8 @@ class Bundle:
     """`(20,)` neutral pose, radians."""
     limits: Array
     """`(20, 2)` limits of the angles, radians."""
+    response: float
+    """Share of the way to the network's pose that a hand goes in one tick, in (0, 1]; its poses lead by that lag."""
     meta: dict[str, Any]
     model_hash: str
     session: onnxruntime.InferenceSession
@@ -46,18 +48,14 @@ def models_folder() -> Path:
     return installed if installed.is_dir() else package.parents[1] / "models"
 
 
-def load_bundle(
-    model: Path | str = DEFAULT_MODEL, providers: tuple[str, ...] = ("CPUExecutionProvider",)
-) -> Bundle:
+def load_bundle(model: Path | str = DEFAULT_MODEL, providers: tuple[str, ...] = ("CPUExecutionProvider",)) -> Bundle:
     """Load a bundle by folder or by the name of a shipped one. Raises `BundleError`."""
     folder = Path(model)
     if not folder.is_dir():
         folder = models_folder() / str(model)
     if not folder.is_dir():
         shipped = sorted(path.name for path in models_folder().glob("*") if (path / "bundle.json").is_file())
-        raise BundleError(
-            f"model {str(model)!r} is no folder and no shipped bundle; shipped are {', '.join(shipped)}"
-        )
+        raise BundleError(f"model {str(model)!r} is no folder and no shipped bundle; shipped are {', '.join(shipped)}")
     meta = _read_meta(folder / "bundle.json")
     path = folder / "manipnet.onnx"
     try:
@@ -66,9 +64,7 @@ def load_bundle(
         raise BundleError(f"{path}: cannot be read ({error.strerror})") from None
     model_hash = hashlib.sha256(content).hexdigest()
     if meta.get("model_sha256") != model_hash:
-        raise BundleError(
-            f"{path}: its hash is not the one in bundle.json; the bundle is damaged, copy it again"
-        )
+        raise BundleError(f"{path}: its hash is not the one in bundle.json; the bundle is damaged, copy it again")
     session = _open_session(path, content, providers)
     return Bundle(folder.name, *_read_pose(folder, meta), meta, model_hash, session)
 
@@ -83,9 +79,7 @@ def _open_session(path: Path, content: bytes, providers: tuple[str, ...]) -> onn
         raise BundleError(f"{path}: not a model this runtime can open ({error})") from None
     sizes = [node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())]
     if sizes != [INPUT_SIZE, OUTPUT_SIZE]:
-        raise BundleError(
-            f"{path}: takes and gives {sizes} numbers; expected are {[INPUT_SIZE, OUTPUT_SIZE]}"
-        )
+        raise BundleError(f"{path}: takes and gives {sizes} numbers; expected are {[INPUT_SIZE, OUTPUT_SIZE]}")
     return session
 
 
@@ -98,9 +92,7 @@ def _read_meta(path: Path) -> dict[str, Any]:
         raise BundleError(f"{path}: not JSON ({error})") from None
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         found = meta.get("format") if isinstance(meta, dict) else None
-        raise BundleError(
-            f"{path}: bundle format {found!r}, this version reads {FORMAT}; train or download it again"
-        )
+        raise BundleError(f"{path}: bundle format {found!r}, this version reads {FORMAT}; train or download it again")
     if meta.get("layout") != describe():
         raise BundleError(f"{path}: trained for another feature layout than this version's; train it again")
     if meta.get("dofs") != list(DOF_NAMES):
@@ -108,17 +100,18 @@ def _read_meta(path: Path) -> dict[str, Any]:
     return meta
 
 
-def _read_pose(folder: Path, meta: dict[str, Any]) -> tuple[Array, Array]:
+def _read_pose(folder: Path, meta: dict[str, Any]) -> tuple[Array, Array, float]:
     try:
         rest = np.array(meta["rest_angles_rad"], dtype=np.float64)
         limits = np.array(meta["limits_rad"], dtype=np.float64)
+        response = float(meta["response"])
     except (KeyError, TypeError, ValueError):
         raise BundleError(
-            f"{folder / 'bundle.json'}: needs rest_angles_rad (20,) and limits_rad (20, 2)"
+            f"{folder / 'bundle.json'}: needs rest_angles_rad (20,), limits_rad (20, 2) and response"
         ) from None
     good = rest.shape == (DOF_COUNT,) and limits.shape == (DOF_COUNT, 2)
     if not (good and np.all(limits[:, 0] <= rest) and np.all(rest <= limits[:, 1])):
-        raise BundleError(
-            f"{folder / 'bundle.json'}: rest_angles_rad (20,) must be inside limits_rad (20, 2)"
-        )
-    return rest, limits
+        raise BundleError(f"{folder / 'bundle.json'}: rest_angles_rad (20,) must be inside limits_rad (20, 2)")
+    if not 0.0 < response <= 1.0:
+        raise BundleError(f"{folder / 'bundle.json'}: response is {response}, allowed is above 0 up to 1")
+    return rest, limits, response
