@@ -1,4 +1,5 @@
 // Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS`. Talks in text lines.
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
@@ -173,9 +174,11 @@ int Live(const std::string& address) {
         Client client(to);
         HandsFrame shown;
         long shows = 0;
+        double slowest = 0.0;
         for (int answered = 0; !ended;) {
             float weight = 0.0F;
             if (client.Sample(LocalNow(), shown, weight)) ++shows;
+            slowest = std::max(slowest, client.GetStats().TransitS);
             std::this_thread::sleep_for(std::chrono::milliseconds(11));
             if (answered == asked) continue;
             ++answered;
@@ -186,7 +189,9 @@ int Live(const std::string& address) {
                 << ",\"late\":" << s.Late << ",\"refused\":" << s.Refused << ",\"connections\":" << s.Connections
                 << ",\"rate_hz\":" << Number(s.RateHz) << ",\"age_s\":" << (s.AgeS < 0 ? "null" : Number(s.AgeS))
                 << ",\"shown_seq\":" << shown.Seq << ",\"session\":" << Quote(shown.Session.Text)
-                << ",\"shows\":" << shows << ",\"allocations\":" << allocations << "}";
+                << ",\"shows\":" << shows << ",\"allocations\":" << allocations
+                << ",\"transit_s\":" << Number(slowest) << "}";
+            slowest = 0.0;
             std::cout << out.str() << std::endl;
             Allocations = 0;  // what answering costs does not count
         }

@@ -181,19 +181,24 @@ static class Harness
             }) { IsBackground = true };
             asking.Start();
             int answered = 0, collections = GC.CollectionCount(0);
-            long shows = 0;
+            long shows = 0, counted = 0;
+            double slowest = 0.0;
             while (!Volatile.Read(ref ended))
             {
                 float weight;
                 if (client.Sample(LocalClock.Now, shown, out weight)) shows++;
+                Stats now = client.GetStats();
+                if (now.Received > counted) slowest = Math.Max(slowest, now.TransitS);
+                counted = now.Received;
                 Thread.Sleep(11);
                 if (answered == Volatile.Read(ref asked)) continue;
                 answered++;
                 Stats stats = client.GetStats();
-                Console.WriteLine("{{\"state\":{0},\"received\":{1},\"lost\":{2},\"late\":{3},\"refused\":{4},\"connections\":{5},\"rate_hz\":{6},\"age_s\":{7},\"shown_seq\":{8},\"session\":{9},\"shows\":{10},\"collections\":{11},\"memory\":{12}}}",
+                Console.WriteLine("{{\"state\":{0},\"received\":{1},\"lost\":{2},\"late\":{3},\"refused\":{4},\"connections\":{5},\"rate_hz\":{6},\"age_s\":{7},\"shown_seq\":{8},\"session\":{9},\"shows\":{10},\"collections\":{11},\"memory\":{12},\"transit_s\":{13}}}",
                     Quote(stats.State), stats.Received, stats.Lost, stats.Late, stats.Refused, stats.Connections, Number(stats.RateHz),
                     double.IsInfinity(stats.AgeS) ? "null" : Number(stats.AgeS), shown.Seq, Quote(shown.Session.Text), shows,
-                    GC.CollectionCount(0) - collections, GC.GetTotalMemory(false));
+                    GC.CollectionCount(0) - collections, GC.GetTotalMemory(false), Number(slowest));
+                slowest = 0.0;
                 Console.Out.Flush();
             }
         }

@@ -23,6 +23,9 @@ namespace ManipNet.Client
 
         /// <summary>Seconds since the newest frame.</summary>
         public double AgeS;
+
+        /// <summary>Seconds the newest frame was on its way; means something only where server and client share a clock.</summary>
+        public double TransitS;
     }
 
     /// <summary>
@@ -168,6 +171,7 @@ namespace ManipNet.Client
                 _session.CopyFrom(_spare.Session);
                 _seq = _spare.Seq;
                 _arrivals[_stats.Received++ % _arrivals.Length] = arrival;
+                _stats.TransitS = arrival - _spare.TPublish;
                 bool taken;
                 _spare = _interpolator.Push(_spare, arrival, out taken);
                 if (taken) _newestAt = arrival;

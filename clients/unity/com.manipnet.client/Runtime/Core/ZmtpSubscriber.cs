@@ -1,5 +1,6 @@
 using System;
 using System.IO;
+using System.Net;
 using System.Net.Sockets;
 using System.Text;
 
@@ -42,19 +43,36 @@ namespace ManipNet.Client
             _start = _end = _resume = 0;
             _inParts = false;
             _heard = _pinged = LocalClock.Now;
-            var client = new TcpClient();
-            IAsyncResult connecting = client.BeginConnect(host, port, null, null);
-            for (int left = ConnectMs; !connecting.AsyncWaitHandle.WaitOne(SliceMs); left -= SliceMs)
-            {
-                if (!Stop && left > 0) continue;
-                client.Close();
-                throw new IOException("no answer from " + host + ":" + port);
-            }
-            client.EndConnect(connecting);
-            _socket = client.Client;
+            _socket = Connect(host, port);
             _socket.NoDelay = true;
             _socket.ReceiveTimeout = _socket.SendTimeout = ConnectMs;
             Handshake(Encoding.ASCII.GetBytes(topic));
+        }
+
+        /// <summary>Without the thread pool, whose threads would stay.</summary>
+        Socket Connect(string host, int port)
+        {
+            IPAddress address;
+            if (!IPAddress.TryParse(host, out address)) address = Dns.GetHostAddresses(host)[0];
+            var socket = new Socket(address.AddressFamily, SocketType.Stream, ProtocolType.Tcp) { Blocking = false };
+            try
+            {
+                socket.Connect(new IPEndPoint(address, port));
+            }
+            catch (SocketException error) when (error.SocketErrorCode == SocketError.WouldBlock || error.SocketErrorCode == SocketError.InProgress)
+            {
+                // under way
+            }
+            int left = ConnectMs;
+            while (!Stop && left > 0 && !socket.Poll(1000 * SliceMs, SelectMode.SelectWrite)) left -= SliceMs;
+            int result = (int)socket.GetSocketOption(SocketOptionLevel.Socket, SocketOptionName.Error);
+            if (Stop || left <= 0 || result != 0)
+            {
+                socket.Close();
+                throw new IOException("nobody answers at " + host + ":" + port);
+            }
+            socket.Blocking = true;
+            return socket;
         }
 
         public void Close()

@@ -105,6 +105,7 @@ void Client::Take(double arrival) {
     Session = Spare->Session;
     Seq = Spare->Seq;
     Arrivals[static_cast<std::size_t>(Counted.Received++) % Arrivals.size()] = arrival;
+    Counted.TransitS = arrival - Spare->TPublish;
     if (Frames.Push(Spare, arrival)) NewestAt = arrival;
     if (Counted.State != "connected") Counted.State = "connected";
 }

@@ -24,7 +24,8 @@ struct Stats {
     std::int64_t Refused = 0;  ///< Messages that could not be read.
     int Connections = 0;
     double RateHz = 0.0;
-    double AgeS = -1.0;  ///< Seconds since the newest frame; negative before the first.
+    double AgeS = -1.0;     ///< Seconds since the newest frame; negative before the first.
+    double TransitS = 0.0;  ///< Seconds it was on its way; means something only where server and client share a clock.
 };
 
 /// Receives the hands of one actor (the first seen, unless named) on its own thread; reconnects by itself. All methods

@@ -42,6 +42,8 @@ bool Interpolator::Sample(double now, HandsFrame& output, float& weight) {
     Parts parts;
     for (std::size_t i = 0; i < Recent.Frames.size(); ++i) parts.Add(*Recent.Frames[i], Recent.Weights[i]);
     Mix(parts, *Recent.Frames[nearest], output);
+    Held.Bodies.reserve(output.BodyCount);  // so that the first gap allocates nothing either
+    Target.Bodies.reserve(output.BodyCount);
     const double starved = (position - static_cast<double>(GridOf(Capture))) / kRateHz;
     Ease(output, starved, now);
     const double target = 1.0 - Smoothstep((starved - kHoldS) / kFadeS);
