@@ -89,17 +89,18 @@ def a_frame(t_s: float) -> BodyFrame:
 
 
 def test_the_mailbox_keeps_the_newest_frames_and_counts_the_others() -> None:
-    mailbox = Mailbox()
+    counters = Counters()
+    mailbox = Mailbox(counters)
     for i in range(MAX_FRAMES + 7):
         mailbox.put(a_frame(float(i)))
     frames = mailbox.wait(0.0)
     assert [frame.t_s for frame in frames] == [float(i) for i in range(7, MAX_FRAMES + 7)]
-    assert mailbox.dropped == 7
+    assert counters.snapshot() == {"frames_dropped": {"mailbox_full": 7}}
     assert mailbox.wait(0.0) == []
 
 
 def test_a_question_is_answered_on_the_tick_thread() -> None:
-    mailbox, answers = Mailbox(), []
+    mailbox, answers = Mailbox(Counters()), []
     asking = threading.Thread(target=lambda: answers.append(mailbox.ask(threading.get_ident, timeout_s=20.0)))
     asking.start()
     while not answers:
@@ -111,7 +112,7 @@ def test_a_question_is_answered_on_the_tick_thread() -> None:
 
 
 def test_an_error_in_a_question_goes_to_who_asked() -> None:
-    mailbox, errors = Mailbox(), []
+    mailbox, errors = Mailbox(Counters()), []
 
     def ask() -> None:
         with pytest.raises(ZeroDivisionError):
@@ -126,7 +127,7 @@ def test_an_error_in_a_question_goes_to_who_asked() -> None:
 
 
 def test_questions_nobody_answers_are_given_up_and_bounded() -> None:
-    mailbox = Mailbox()
+    mailbox = Mailbox(Counters())
     for _ in range(MAX_REQUESTS):
         with pytest.raises(BusyError, match="did not answer"):
             mailbox.ask(lambda: None, timeout_s=0.0)

@@ -39,7 +39,7 @@ class Bench:
 
     def __init__(self, bundle: Bundle, folder: Path, actors: list[Actor], counters: Counters, synthesizer=None) -> None:
         self.messages: list[HandsMessage] = []
-        self.counters, self.mailbox, self.actors = counters, Mailbox(), actors
+        self.counters, self.mailbox, self.actors = counters, Mailbox(counters), actors
         timings = Timings()
         stages = StageClock(timings)
         self.loop = TickLoop(

@@ -109,6 +109,11 @@ class Actor:
             return "unknown_body"
         return self.timeline.push(frame.t_s, poses, frame.t_received_s, frame.source)
 
+    def expected(self) -> list[BodyKey]:
+        """Ids and names of the bodies this actor consists of."""
+        bodies = (*self.config.wrists.values(), *(thing.body for thing in self.config.objects))
+        return [body.key for body in bodies]
+
     def carry(self, body: BodyKey, object_name: str, shape: Shape, scale: float) -> Prop:
         """Let a body, by its key in the stream or its name here, carry a shape from now on.
 

@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from typing import Final, TypeVar
 
 from manipnet.streams.bodies import BodyFrame
+from manipnet.telemetry import Counters
 
 MAX_FRAMES: Final = 512
 """More than a second at 360 Hz; beyond it the oldest frames make room."""
@@ -22,18 +23,18 @@ class BusyError(RuntimeError):
 class Mailbox:
     """Bounded, newest wins. `put` and `ask` from any thread; `wait` from the tick thread only."""
 
-    def __init__(self) -> None:
+    def __init__(self, counters: Counters) -> None:
+        self._counters = counters
         self._news = threading.Condition()
         self._frames: deque[BodyFrame] = deque()
         self._requests: deque[tuple[Callable[[], object], Future]] = deque()
-        self.dropped = 0
 
     def put(self, frame: BodyFrame) -> None:
         """Leave a frame; never waits for the tick thread."""
         with self._news:
             if len(self._frames) >= MAX_FRAMES:
                 self._frames.popleft()
-                self.dropped += 1
+                self._counters.add("frames_dropped", reason="mailbox_full")
             self._frames.append(frame)
             self._news.notify()
 

@@ -60,7 +60,7 @@ class Server:
         self._config, self._say = config, say
         self.session = secrets.token_hex(8)
         self.counters, self.timings = Counters(), Timings()
-        self._mailbox, self._wardrobe, self._watch = Mailbox(), Wardrobe(), SilenceWatch()
+        self._mailbox, self._wardrobe, self._watch = Mailbox(self.counters), Wardrobe(), SilenceWatch()
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model)
         self._actors = [self._actor(actor) for actor in config.actors]

@@ -16,6 +16,8 @@ _log = logging.getLogger(__name__)
 
 def second_line(actors: Sequence[Actor], counters: Counters, timings: Timings, rate_hz: float) -> str:
     """One second of a server in one line: rate, delay, both hands of each actor, what was lost."""
+    if not any(actor.timeline.running for actor in actors):
+        return "waiting for bodies: nothing of the rig has arrived yet (`manipnet doctor` says why)"
     p50, p99 = timings.recent("total", 50, 99)
     counted = counters.snapshot()
     lost = sum(sum(counted.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))

@@ -14,7 +14,7 @@ from manipnet.streams.gates import BodyGate
 from manipnet.streams.wire import HandsMessage, Latency
 from manipnet.synthesis import HandStep, Side, Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
-from manipnet.timeline import TICK_S, Tick
+from manipnet.timeline import Tick
 
 MAX_WAIT_S = 0.05
 """A stop is noticed within this."""
@@ -71,6 +71,8 @@ class TickLoop:
             reason = min(reasons, key=_BEST_FIRST.index)
             if reason != _TAKEN:
                 self._counters.add("frames_dropped", reason=reason)
+            if reason == "unknown_body":
+                _log.warning("a frame of %s has no body of the rig: %s", frame.source, self._compare(frame))
 
     def step(self, now_s: float) -> bool:
         """Show the next tick of every actor that has one due; False when none has."""
@@ -80,6 +82,12 @@ class TickLoop:
         for actor, tick, plan in plans:
             self._publish_hands(actor, tick, self._hands(actor, tick, plan, steps))
         return bool(plans)
+
+    def _compare(self, frame: BodyFrame) -> str:
+        """What came beside what is expected, for the person who has to make them match."""
+        came = [str(body.id if body.name is None else body.name) for body in frame.bodies]
+        expected = [str(key) for actor in self.actors for key in actor.expected()]
+        return f"it has {', '.join(came[:8]) or 'none'}; expected are {', '.join(expected[:16])}"
 
     def _push(self, actor: Actor, frame: BodyFrame) -> str:
         restarts = actor.timeline.restarts

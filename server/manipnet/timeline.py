@@ -151,6 +151,11 @@ class Timeline:
         self._senders: dict[str, tuple[str, float]] = {}
         self._witnesses: list[tuple[float, Poses, float]] = []
 
+    @property
+    def running(self) -> bool:
+        """Whether a frame has come yet."""
+        return self._run is not None
+
     def push(self, t_s: float, poses: Poses, now_s: float, source: str = "") -> str | None:
         """Take one frame of this actor's bodies; returns why it was dropped, or None.
 

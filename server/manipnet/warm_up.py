@@ -27,7 +27,8 @@ FRAMES = 120
 def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
     """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
     for shape in shapes:
-        counters, timings, mailbox = Counters(), Timings(), Mailbox()
+        counters, timings = Counters(), Timings()
+        mailbox = Mailbox(counters)
         actor = Actor(default_actor(), [Prop("prop", shape.name, shape)], bundle, counters, 0.5)
         actor.carry("prop", shape.name, shape, 1.0)
         stages = StageClock(timings)
