@@ -74,14 +74,14 @@ def slow_features(shape, distance_of, windows, positions, rotations, n):
     flip = g.MIRROR if windows.mirrored[n] else np.eye(3)
     scale, row = windows.scale[n], {}
     W = g.quat_to_matrix(windows.wrist[n, :, 3:])
-    O = g.quat_to_matrix(windows.object[n, :, 3:])
+    turn = g.quat_to_matrix(windows.object[n, :, 3:])
     R0, p0 = W[PRESENT], windows.wrist[n, PRESENT, :3]
     axes = np.concatenate([rotations[n], rotations[n][PARENTS[17:]]])
     row["joint_positions"], row["joint_axes"] = positions[n], np.moveaxis(axes[..., :2], -1, -2)
     row["wrist_positions"] = (windows.wrist[n, :, :3] - p0) @ R0
     row["wrist_axes"] = np.moveaxis((R0.T @ W)[..., :2], -1, -2)
     row["other_wrist_distances"] = np.linalg.norm(windows.other_wrist[n] - p0, axis=1)
-    center = windows.object[n, :, :3] + scale * (O @ flip @ shape.center_of_mass)
+    center = windows.object[n, :, :3] + scale * (turn @ flip @ shape.center_of_mass)
     row["object_centers"] = (center - p0) @ R0
     q = windows.object[n, :, 3:]
     turns = g.quat_log(g.quat_multiply(q[1:], g.quat_conjugate(q[:-1]))) / 0.05
@@ -89,7 +89,7 @@ def slow_features(shape, distance_of, windows, positions, rotations, n):
 
     def to_object(points, t):
         world = points @ W[t].T + windows.wrist[n, t, :3]
-        return (world - windows.object[n, t, :3]) @ O[t] @ flip / scale
+        return (world - windows.object[n, t, :3]) @ turn[t] @ flip / scale
 
     steps = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
     cells = CENTER_M + np.array(list(itertools.product(steps, steps, steps)))

@@ -109,7 +109,9 @@ def test_cache_gives_the_same_shape_and_survives_damage(tmp_path, points):
 @pytest.mark.parametrize("take", ["cube_med2", "cyl_med3", "mug1", "teapot2", "wineglass3"])
 def test_independent_values(manipnet_data, take):
     checks = np.load(manipnet_data.parent / "checks" / "geometry.npz")
-    shape = load_shape(manipnet_data / "meshes" / f"{take.rstrip('0123456789') + ('' if 'med' in take else take[-1])}.obj")
+    shape = load_shape(
+        manipnet_data / "meshes" / f"{take.rstrip('0123456789') + ('' if 'med' in take else take[-1])}.obj"
+    )
     points = checks[f"{take}/points_object"].reshape(-1, 3)
     distance, _, closest = shape.signed_distance(points)
     expected = checks[f"{take}/closest_object"].reshape(-1, 3)

@@ -63,9 +63,7 @@ def messages() -> dict[str, HandsMessage]:
     return {
         "live": base,
         "hold_left_only": replace(base, seq=2**40 + 5, hands={"left": hand(3, "hold", "cube")}),
-        "rest_no_object": replace(
-            base, hands={s: hand(4, "rest", None) for s in ("left", "right")}, bodies=()
-        ),
+        "rest_no_object": replace(base, hands={s: hand(4, "rest", None) for s in ("left", "right")}, bodies=()),
         "right_first": replace(base, hands={"right": hand(8, "live", None), "left": hand(9, "hold", "ü")}),
         "many_bodies": replace(base, bodies=tuple(body(i, f"body {i}", i % 3 > 0) for i in range(40))),
         "no_hands": replace(base, session="", actor="演者", hands={}, bodies=(), look_ahead=0.0),
@@ -99,9 +97,7 @@ def expected(message: HandsMessage) -> dict[str, Any]:
             }
             for side, h in message.hands.items()
         },
-        "bodies": [
-            {"name": name(b.name), "tracked": b.tracked, "pose": b.pose.tolist()} for b in message.bodies
-        ],
+        "bodies": [{"name": name(b.name), "tracked": b.tracked, "pose": b.pose.tolist()} for b in message.bodies],
     }
 
 

@@ -39,9 +39,7 @@ class Bvh:
     def local_transforms(self) -> tuple[Array, Array]:
         """Translations `(T, J, 3)` (offset plus position) and rotations `(T, J, 4)`, each in its parent."""
         frames = len(self.motion)
-        translations = np.tile(
-            np.array([joint.offset for joint in self.joints], dtype=np.float64), (frames, 1, 1)
-        )
+        translations = np.tile(np.array([joint.offset for joint in self.joints], dtype=np.float64), (frames, 1, 1))
         rotations = np.tile([0.0, 0.0, 0.0, 1.0], (frames, len(self.joints), 1))
         column = 0
         for j, joint in enumerate(self.joints):
@@ -121,9 +119,7 @@ def _parse_motion(text: str, columns: int) -> tuple[float, Array]:
         # One pass over one list is 20 times faster than a conversion per line.
         frame_time_s, *values = map(float, body.split())
     except ValueError as error:
-        raise BvhError(
-            f"MOTION section must read 'Frames: N', 'Frame Time: S', then numbers only ({error})"
-        ) from None
+        raise BvhError(f"MOTION section must read 'Frames: N', 'Frame Time: S', then numbers only ({error})") from None
     motion = np.array(values)
     if motion.size != frames * columns or not frames:
         raise BvhError(f"{frames} frames of {columns} channels announced, {motion.size} numbers found")

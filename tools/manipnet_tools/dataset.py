@@ -140,6 +140,4 @@ def samples_at(
     windows = track.windows(frames) if windows is None else windows
     inputs = features(track.shape, windows, *forward_kinematics(before))
     positions, rotations = forward_kinematics(after)
-    return Samples(
-        inputs, pose_outputs(positions, rotations, joint_distances(track.shape, windows, positions))
-    )
+    return Samples(inputs, pose_outputs(positions, rotations, joint_distances(track.shape, windows, positions)))

@@ -83,7 +83,7 @@ def rods(starts: Array, ends: Array, radius: float, color: tuple[float, float, f
     frames = np.stack([u, np.cross(w, u), w], axis=1)
     bar = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=10)
     stretch = np.concatenate([np.full((len(length), 2), radius), length], axis=1)
-    local = (bar.vertices + [0.0, 0.0, 0.5]) * stretch[:, None]
+    local = (bar.vertices + np.array([0.0, 0.0, 0.5])) * stretch[:, None]
     return _repeat(np.asarray(starts)[:, None] + local @ frames, bar.faces, color)
 
 

@@ -74,15 +74,11 @@ def read_bvh_folder(folder: Path) -> Take:
         raise TakeError(str(error)) from None
     missing = {"leftHand", "rightHand"} - files.keys()
     if missing:
-        raise TakeError(
-            f"{folder}: no {' and no '.join(sorted(missing))}.bvh; a take needs both hands' files"
-        )
+        raise TakeError(f"{folder}: no {' and no '.join(sorted(missing))}.bvh; a take needs both hands' files")
     lengths = {stem: len(bvh.motion) for stem, bvh in files.items()}
     rates = {round(1.0 / bvh.frame_time_s, 3) for bvh in files.values()}
     if len(set(lengths.values())) > 1 or len(rates) > 1:
-        raise TakeError(
-            f"{folder}: files must share length and rate, found {lengths} frames at {sorted(rates)} Hz"
-        )
+        raise TakeError(f"{folder}: files must share length and rate, found {lengths} frames at {sorted(rates)} Hz")
     rate_hz = rates.pop()
     fingers = {side: _hand(folder / f"{side}Hand.bvh", files.pop(f"{side}Hand"), side) for side in SIDES}
     tracks = {
@@ -107,9 +103,7 @@ def _hand(path: Path, bvh: Bvh, side: str) -> Fingers:
     """World joints and bone rotations; the tips, which the files lack, come from the skeleton."""
     names = [joint.name for joint in bvh.joints]
     if names != list(JOINT_NAMES[:BONE_COUNT]):
-        raise TakeError(
-            f"{path}: joints must be {' '.join(JOINT_NAMES[:BONE_COUNT])}, found {' '.join(names)}"
-        )
+        raise TakeError(f"{path}: joints must be {' '.join(JOINT_NAMES[:BONE_COUNT])}, found {' '.join(names)}")
     translations, rotations = bvh.local_transforms()
     translations, local = DECIMETRE_M * mirror_points(translations), mirror_quats(rotations)
     tips = OFFSETS_M[BONE_COUNT:] if side == "right" else mirror_points(OFFSETS_M[BONE_COUNT:])

@@ -81,7 +81,7 @@ REST_QUATS /= np.linalg.norm(REST_QUATS, axis=1, keepdims=True)
 """Local rotation of each bone when its angles are zero, `(17, 4)` xyzw."""
 
 _DOFS = (
-    # name, joint, axis in the parent bone's frame (an abduction axis turns with the flexion before it), limits in degrees
+    # name, joint, axis in the parent bone's frame (abduction: as the flexion before has turned it), limits in degrees
     ("THUMB_CMC_FE", 1, (-0.875368, 0.084277, -0.476054), (-31, 39)),
     ("THUMB_CMC_AA", 2, (-0.747302, -0.514693, 0.420274), (-38, 36)),
     ("THUMB_MCP_FE", 3, (0.377081, -0.912429, 0.159005), (-22, 50)),
@@ -116,9 +116,14 @@ DOF_LIMITS_RAD: Final = np.radians(np.array([dof[3] for dof in _DOFS], dtype=np.
 """Lower and upper limit of each angle, `(20, 2)`: 0.5 to 99.5 percentile of the captured hand, widened by 7 degrees."""
 
 CAPSULE_JOINTS: Final = np.array(
-    [(0, 5), (0, 8), (0, 11), (0, 14)]
-    + [(1, 2), (2, 3), (3, 4), (4, 17)][1:]
-    + [(5, 6), (6, 7), (7, 18), (8, 9), (9, 10), (10, 19), (11, 12), (12, 13), (13, 20), (14, 15), (15, 16), (16, 21)]
+    [
+        *((0, 5), (0, 8), (0, 11), (0, 14)),
+        *((2, 3), (3, 4), (4, 17)),
+        *((5, 6), (6, 7), (7, 18)),
+        *((8, 9), (9, 10), (10, 19)),
+        *((11, 12), (12, 13), (13, 20)),
+        *((14, 15), (15, 16), (16, 21)),
+    ]
 )
 """Start and end joint of the 19 capsules: 4 palm (wrist to MCP), then 3 per finger from thumb to pinky."""
 

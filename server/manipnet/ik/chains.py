@@ -9,9 +9,7 @@ FINGERS = 5
 DOFS = 4
 """Angles of finger `f` are `4 f … 4 f + 3`, from the root to the tip."""
 
-MOVED_JOINTS = np.array(
-    [joints[-4:] if f == 0 else (*joints[-3:], -1) for f, joints in enumerate(FINGER_JOINTS)]
-)
+MOVED_JOINTS = np.array([joints[-4:] if f == 0 else (*joints[-3:], -1) for f, joints in enumerate(FINGER_JOINTS)])
 """Joints each finger's angles move, `(5, 4)`, -1 where there is none: the thumb has four, the others three."""
 
 CAPSULES = np.array([[4 + 3 * f + k for k in range(3)] for f in range(FINGERS)])

@@ -1,4 +1,4 @@
-"""Damped least squares over the 20 angles: joints to their targets, capsules out of the object, near the network's pose.
+"""Damped least squares over the 20 angles: joints to targets, capsules out of the object, near the network's pose.
 
 Each finger is a problem of four unknowns; a few Gauss-Newton steps with a 4 x 4 Cholesky solve are exact enough and
 cost microseconds. Capsules meet the field, not the triangles: it is smooth and has its own gradient.

@@ -191,13 +191,9 @@ def _features_without_rays(
         place_sensors(sensors, positions[n], rotations[n], points, directions)
         for s in range(_SENSED_COUNT):
             t = SENSED[s]
-            object_from_wrist(
-                windows.wrist[n, t], windows.object[n, t], windows.mirrored[n], rotation, translation
-            )
+            object_from_wrist(windows.wrist[n, t], windows.object[n, t], windows.mirrored[n], rotation, translation)
             aim_rays(rotation, translation, scale, points, directions, rays[0, n, s], rays[1, n, s])
-            sense_distances(
-                bvh, field, rotation, translation, scale, exact_within_m, positions[n], distances, normals
-            )
+            sense_distances(bvh, field, rotation, translation, scale, exact_within_m, positions[n], distances, normals)
             row[_DISTANCES + 22 * s : _DISTANCES + 22 * (s + 1)] = distances
             if s == 0:
                 sense_ambient(field, rotation, translation, scale, row[_AMBIENT : _AMBIENT + 1000])

@@ -61,9 +61,7 @@ def _order_triangles(corners):
             links[node, 0], links[node, 1] = first, last - first
             continue
         axis = int(np.argmax(center_upper - center_lower))
-        split = _partition(
-            order, first, last, lower, upper, middle, axis, center_lower[axis], center_upper[axis]
-        )
+        split = _partition(order, first, last, lower, upper, middle, axis, center_lower[axis], center_upper[axis])
         links[node, 0] = nodes
         spans[depth, 0], spans[depth, 1], spans[depth, 2] = nodes, first, split
         spans[depth + 1, 0], spans[depth + 1, 1], spans[depth + 1, 2] = nodes + 1, split, last
@@ -141,7 +139,7 @@ def pseudo_normals(vertices: Array, faces: np.ndarray) -> Array:
 
 @njit(cache=True, nogil=True, inline="always")
 def _closest_on_triangle(px, py, pz, t, f):
-    """Closest point of triangle `t[f]` of `t (F, 3, 3)`: its coordinates and its region (0 face, 1-3 edges, 4-6 corners).
+    """Closest point of triangle `t[f]` of `t (F, 3, 3)`: coordinates and region (0 face, 1-3 edges, 4-6 corners).
 
     Ericson, Real-Time Collision Detection, section 5.1.5.
     """

@@ -116,9 +116,7 @@ def field_distance(field, px, py, pz):
     d00, d01 = d000 + u * (d100 - d000), d001 + u * (d101 - d001)
     d10, d11 = d010 + u * (d110 - d010), d011 + u * (d111 - d011)
     d0, d1 = d00 + v * (d10 - d00), d01 + v * (d11 - d01)
-    gx = (1 - v) * ((1 - w) * (d100 - d000) + w * (d101 - d001)) + v * (
-        (1 - w) * (d110 - d010) + w * (d111 - d011)
-    )
+    gx = (1 - v) * ((1 - w) * (d100 - d000) + w * (d101 - d001)) + v * ((1 - w) * (d110 - d010) + w * (d111 - d011))
     gy = (1 - w) * (d10 - d00) + w * (d11 - d01)
     return d0 + w * (d1 - d0), gx / cell, gy / cell, (d1 - d0) / cell
 
@@ -135,16 +133,14 @@ def signed_distance(bvh, field, px, py, pz, exact_within_m):
         return rough, gx / length, gy / length, gz / length
     cell = field.cell_m
     nx, ny, nz = field.distance.shape
-    i = min(max(int(round((px - field.origin[0]) / cell)), 0), nx - 1)
-    j = min(max(int(round((py - field.origin[1]) / cell)), 0), ny - 1)
-    k = min(max(int(round((pz - field.origin[2]) / cell)), 0), nz - 1)
+    i = min(max(round((px - field.origin[0]) / cell), 0), nx - 1)
+    j = min(max(round((py - field.origin[1]) / cell), 0), ny - 1)
+    k = min(max(round((pz - field.origin[2]) / cell), 0), nz - 1)
     d, x, y, z, triangle, region = closest_point(bvh, px, py, pz, field.triangle[i, j, k])
     # farther from the surface than any grid point is from here, that grid point has our sign: it holds even where
     # a mesh crosses itself and pseudo-normals do not
     if abs(d) > _NODE_REACH_CELLS * cell and (field.distance[i, j, k] < 0.0) != (d < 0.0):
-        on_grid = (
-            abs(px - field.origin[0] - i * cell) <= cell and abs(py - field.origin[1] - j * cell) <= cell
-        )
+        on_grid = abs(px - field.origin[0] - i * cell) <= cell and abs(py - field.origin[1] - j * cell) <= cell
         if on_grid and abs(pz - field.origin[2] - k * cell) <= cell:
             d = -d
     if abs(d) < 1e-7:

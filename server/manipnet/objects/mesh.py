@@ -102,13 +102,7 @@ def _is_obj(path: Path) -> bool:
 
 
 def _check_arrays(vertices: NDArray, faces: NDArray) -> None:
-    if (
-        vertices.ndim != 2
-        or vertices.shape[1] != 3
-        or faces.ndim != 2
-        or faces.shape[1] != 3
-        or not len(faces)
-    ):
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
         raise MeshError(f"needs vertices (V, 3) and faces (F, 3), found {vertices.shape} and {faces.shape}")
     if not np.isfinite(vertices).all():
         bad = int(np.argwhere(~np.isfinite(vertices))[0, 0])

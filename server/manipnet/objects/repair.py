@@ -11,9 +11,7 @@ Vertices = NDArray[np.float64]
 Faces = NDArray[np.int32]
 
 _WELD = 1e-6  # of the mesh's size: closer vertices are one
-_MAX_HOLE = (
-    0.25  # of the mesh's size: a wider opening is a shape, such as a vessel without walls, and not a flaw
-)
+_MAX_HOLE = 0.25  # of the mesh's size: a wider opening is a shape, such as a vessel without walls, and not a flaw
 
 
 @dataclass(frozen=True)
@@ -47,9 +45,7 @@ def is_consistent(faces: Faces) -> bool:
 def weld(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
     """Merge vertices at the same place, then drop the faces and vertices this leaves without meaning."""
     size = max(float(np.ptp(vertices, axis=0).max()), 1e-12)
-    _, first, to = np.unique(
-        np.round(vertices / (_WELD * size)), axis=0, return_index=True, return_inverse=True
-    )
+    _, first, to = np.unique(np.round(vertices / (_WELD * size)), axis=0, return_index=True, return_inverse=True)
     return compact(vertices[first], to.reshape(-1)[faces].astype(np.int32))
 
 

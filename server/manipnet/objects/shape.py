@@ -87,9 +87,7 @@ def load_shape(path: Path | str, unit: str = "m", scale: float = 1.0, name: str 
 
 def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
-    folder = cache_dir or Path(
-        os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False)
-    )
+    folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
     path = folder / f"{mesh.content_hash[:32]}-{_CACHE_VERSION}.npz"
     parts = _read_cache(path)
     if parts is None:

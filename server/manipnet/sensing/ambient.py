@@ -31,7 +31,7 @@ def occupancy(distance, ox, oy, oz):
 
 @njit(cache=True, nogil=True)
 def sense_ambient(field, rotation, translation, scale, out):
-    """Occupancies into `out (1000,)`, x slowest. Blocks of eight cells far outside or deep inside are filled at once."""
+    """Occupancies into `out (1000,)`, x slowest. Blocks of eight cells far outside or deep inside go at once."""
     out[:] = 0.0
     for i in range(0, CELLS, 2):
         for j in range(0, CELLS, 2):

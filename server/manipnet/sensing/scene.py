@@ -19,7 +19,7 @@ def quat_to_matrix_into(q, out):
 
 @njit(cache=True, nogil=True)
 def object_from_wrist(wrist, obj, mirrored, rotation, translation):
-    """The map from wrist coordinates to the object's own metres: `x_object = (rotation · x_wrist + translation) / scale`.
+    """From wrist coordinates to the object's own metres: `x_object = (rotation · x_wrist + translation) / scale`.
 
     `wrist` and `obj` are poses `(7,)` of the scene as the network sees it; in a mirrored scene the object is its mirror
     image, so the map ends with a reflection. `rotation (3, 3)` and `translation (3,)` are written.
