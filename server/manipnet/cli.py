@@ -120,6 +120,10 @@ def configure(arguments: argparse.Namespace):
     objects = tuple(parse_object(text) for text in arguments.mesh)
     if arguments.rig is not None and (objects or arguments.demo):
         raise ConfigError("--rig names the objects itself; leave out --mesh and --demo")
+    if arguments.demo:
+        from manipnet.demo.performance import demo_objects
+
+        objects = demo_objects(objects)
     options: dict[str, Any] = {}
     actors = (default_actor(objects),)
     if arguments.rig is not None:

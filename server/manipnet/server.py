@@ -6,12 +6,12 @@ import secrets
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from platformdirs import user_log_path
 
 from manipnet.actor import Actor
-from manipnet.config import ActorConfig, ServerConfig, check
+from manipnet.config import ActorConfig, ConfigError, ServerConfig, check
 from manipnet.control import Control
 from manipnet.flight_recorder import FlightRecorder
 from manipnet.mailbox import Mailbox
@@ -30,6 +30,9 @@ from manipnet.synthesis import Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
 from manipnet.tick_loop import TickLoop
 from manipnet.warm_up import warm_up
+
+if TYPE_CHECKING:
+    from manipnet.demo.performance import Demo
 
 SWITCH_INTERVAL_S = 0.001
 """How long a busy thread may keep the interpreter: a receiver must not wait the usual 5 ms for a tick."""
@@ -65,6 +68,7 @@ class Server:
         self._bundle = load_bundle(config.model)
         self._actors = [self._actor(actor) for actor in config.actors]
         self._shown = 0
+        self._demo = self._make_demo() if config.demo else None
 
     def run(self, stopping: Callable[[], bool]) -> None:
         """Listen, say `ready`, turn bodies into hands until `stopping`, close everything.
@@ -78,6 +82,9 @@ class Server:
             gc.collect()
             gc.freeze()
             self._say("ready " + " ".join(f"{what} {address}" for what, address in addresses.items()))
+            if self._demo is not None:
+                opened.callback(self._demo.stop)
+                self._demo.start(addresses["bodies"])
             loop.run(stopping, self._every_second)
 
     def _open(self, opened: ExitStack) -> tuple[TickLoop, dict[str, str]]:
@@ -140,6 +147,13 @@ class Server:
             interface=self._config.interface,
             up=self._config.up,
         )
+
+    def _make_demo(self) -> "Demo":
+        from manipnet.demo.performance import Demo  # its libraries are of no use to a live session
+
+        if self._keys is not None:
+            raise ConfigError("--demo plays through a socket that asks for keys, and has none; leave out --keys")
+        return Demo()
 
     def _actor(self, config: ActorConfig) -> Actor:
         props = [self._wardrobe.load(thing) for thing in config.objects]
