@@ -79,11 +79,11 @@ def test_the_look_ahead_changes_while_it_runs(stage: Stage) -> None:
 
 def test_rest_eases_both_hands_to_rest_and_lets_them_go_on(stage: Stage) -> None:
     def poses(t_s: float):
-        if t_s == 0.5:
+        if t_s == 1.0:
             assert stage.server.ask({"op": "rest"}) == {"actors": ["actor"]}
         return scene(t_s)
 
-    states = [m.hands["right"].state for m in stage.perform(3.5, poses)]
+    states = [m.hands["right"].state for m in stage.perform(4.0, poses)]
     changes = [state for i, state in enumerate(states) if i == 0 or state != states[i - 1]]
     assert changes[-3:] == ["live", "rest", "live"]
 
