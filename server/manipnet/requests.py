@@ -29,13 +29,14 @@ class Requests:
         self,
         session: str,
         model: str,
+        model_hash: str,
         actors: Sequence[Actor],
         wardrobe: Wardrobe,
         mailbox: Mailbox,
         counters: Counters,
         timings: Timings,
     ) -> None:
-        self._session, self._model = session, model
+        self._session, self._model, self._model_hash = session, model, model_hash
         self._actors, self._wardrobe, self._mailbox = actors, wardrobe, mailbox
         self._counters, self._timings = counters, timings
         self._started_s = time.monotonic()
@@ -58,6 +59,7 @@ class Requests:
             "schema": VERSION,
             "session": self._session,
             "model": self._model,
+            "model_hash": self._model_hash,
             "tick_hz": TICK_HZ,
             "actors": [actor.config.name for actor in self._actors],
             "joint_names": list(JOINT_NAMES),

@@ -126,7 +126,14 @@ class Server:
 
     def _requests(self) -> Requests:
         return Requests(
-            self.session, self._bundle.name, self._actors, self._wardrobe, self._mailbox, self.counters, self.timings
+            self.session,
+            self._bundle.name,
+            self._bundle.model_hash,
+            self._actors,
+            self._wardrobe,
+            self._mailbox,
+            self.counters,
+            self.timings,
         )
 
     def _zmq_bodies(self) -> ZmqBodies:

@@ -1,0 +1,173 @@
+"""`manipnet record`: what a running server hears of the bodies and says of the hands, or what a tracker sends."""
+
+import json
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import zmq
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from manipnet.config import parse_endpoint
+from manipnet.objects.library import LIBRARY_FOLDER, library_names
+from manipnet.recording import BODIES, HANDS, RecordingError, RecordingWriter
+from manipnet.rig import load_rig
+from manipnet.streams.bodies import BodyFrame, BodySample, MessageError
+from manipnet.streams.curve import secure_client
+from manipnet.streams.keys import read_client_keys
+from manipnet.streams.wire import TOPIC_MSGPACK, HandsMessage, decode_msgpack
+from manipnet.streams.zmq_bodies import MAX_WIRE_BYTES, ZmqBodies
+from manipnet.telemetry import Counters
+from manipnet_tools.stopping import stop_on_signals
+
+HANDS_PORT = 5555
+CONTROL_PORT = 5557
+ANSWER_MS = 3_000
+POLL_MS = 50
+
+
+@dataclass(frozen=True)
+class RecordOptions:
+    """Record until Ctrl-C, or for --seconds.
+
+    From a running server: its hands and, at 60 Hz, the bodies they were made from.
+    Without a server (--bodies-port): the bodies a tracker sends here, as they come.
+    Example: manipnet record --out take.mcap --rig stage.toml
+    """
+
+    out: Path
+    """The file to write, .mcap; it must not exist."""
+    server: str = "127.0.0.1:5555"
+    """HOST:PORT of the server's hands."""
+    bodies_port: int | None = None
+    """Instead: listen here, in the place of a server, for senders of bodies over ZeroMQ."""
+    control: str = "127.0.0.1:5557"
+    """HOST:PORT of the server's requests, which is asked about its model and objects."""
+    actor: str | None = None
+    """Whose bodies to record where there are several actors; by default the first one's that is heard."""
+    rig: Path | None = None
+    """The server's rig file: it and its meshes are kept in the recording."""
+    keys: Path | None = None
+    """The client's key file, where the server asks for one."""
+    seconds: float | None = None
+    """Stop after this long."""
+
+
+def run(options: RecordOptions) -> None:
+    """Record. Raises `RecordingError`, `ConfigError`, `MeshError`, `KeyFileError` and `OSError`."""
+    about, meshes = read_rig(options.rig)
+    if options.bodies_port is None:
+        told, props = ask_server(options.control, options.keys)
+        about, meshes = told | about, props | meshes
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with (
+        stop_on_signals() as stopping,
+        RecordingWriter(options.out, about, meshes) as writer,
+        Progress(*columns, console=Console(stderr=True)) as progress,
+    ):
+        task = progress.add_task("waiting for data")
+        begin_s = time.monotonic()
+
+        def going_on() -> bool:
+            progress.update(task, description=_counts(writer))
+            too_long = options.seconds is not None and time.monotonic() - begin_s >= options.seconds
+            return not (stopping.is_set() or too_long)
+
+        if options.bodies_port is not None:
+            record_bodies(options.bodies_port, writer, stopping, going_on)
+        else:
+            record_hands(options.server, options.keys, options.actor, writer, going_on)
+    Console(stderr=True).print(f"wrote {options.out}: {_counts(writer)}")
+
+
+def record_hands(
+    server: str, keys: Path | None, actor: str | None, writer: RecordingWriter, going_on: Callable[[], bool]
+) -> None:
+    """Write every hands message of a server, and the bodies of one actor as body frames, while `going_on`."""
+    with zmq.Context() as context, context.socket(zmq.SUB) as socket:
+        socket.setsockopt(zmq.RCVHWM, 0)  # nothing of a recording is dropped while a disk is slow
+        socket.subscribe(TOPIC_MSGPACK)
+        _connect(socket, server, HANDS_PORT, keys)
+        while going_on():
+            if socket.poll(POLL_MS):
+                while socket.poll(0):
+                    message = _decode(socket.recv())
+                    actor = actor or message.actor
+                    now_ns = time.time_ns()
+                    if message.actor == actor and message.bodies:
+                        writer.write_bodies(bodies_of(message), now_ns)
+                    writer.write_hands(message, now_ns)
+
+
+def record_bodies(port: int, writer: RecordingWriter, stopping: threading.Event, going_on: Callable[[], bool]) -> None:
+    """Write every body frame sent to this machine's `port` while `going_on`."""
+    receiver = ZmqBodies(lambda frame: writer.write_bodies(frame, time.time_ns()), Counters(), port=port)
+    receiver.start()
+    try:
+        while going_on():
+            stopping.wait(1e-3 * POLL_MS)
+    finally:
+        receiver.stop()
+
+
+def bodies_of(message: HandsMessage) -> BodyFrame:
+    """The bodies of a hands message as the frame a tracker would have sent at that instant."""
+    bodies = [
+        BodySample(None, body.name, tuple(body.pose[:3].tolist()), tuple(body.pose[3:].tolist()), body.tracked)
+        for body in message.bodies
+    ]
+    return BodyFrame(message.t_capture, message.seq, tuple(bodies), message.t_publish, "hands")
+
+
+def ask_server(control: str, keys: Path | None) -> tuple[dict[str, str], dict[str, bytes]]:
+    """Metadata and library meshes of a running server; nothing when it does not answer."""
+    with zmq.Context() as context, context.socket(zmq.REQ) as socket:
+        _connect(socket, control, CONTROL_PORT, keys)
+        answers = []
+        for op in ("hello", "objects"):
+            socket.send(json.dumps({"op": op}).encode())
+            if not socket.poll(ANSWER_MS):
+                return {}, {}
+            answers.append(json.loads(socket.recv()))
+    hello, objects = answers
+    about = {key: str(hello[key]) for key in ("session", "model", "model_hash", "version") if key in hello}
+    carried = {name: prop for props in objects.get("bodies", {}).values() for name, prop in props.items()}
+    meshes = {
+        f"{name}.ply": (LIBRARY_FOLDER / f"{prop['object']}.ply").read_bytes()
+        for name, prop in carried.items()
+        if prop["object"] in library_names() and prop["scale"] == 1.0
+    }
+    return about | {"objects": json.dumps(carried)}, meshes
+
+
+def read_rig(file: Path | None) -> tuple[dict[str, str], dict[str, bytes]]:
+    """A rig file as metadata, and its meshes. Raises `ConfigError` and `OSError`."""
+    if file is None:
+        return {}, {}
+    objects = [thing for actor in load_rig(file).actors for thing in actor.objects]
+    meshes = {f"{thing.name}{thing.mesh.suffix}": thing.mesh.read_bytes() for thing in objects}
+    return {"rig": file.read_text(encoding="utf-8")}, meshes
+
+
+def _connect(socket: zmq.Socket, address: str, default_port: int, keys: Path | None) -> None:
+    host, port = parse_endpoint(address, default_port)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.MAXMSGSIZE, MAX_WIRE_BYTES)
+    socket.setsockopt(zmq.IPV6, int(":" in host))
+    if keys is not None:
+        secure_client(socket, read_client_keys(keys))
+    socket.connect(f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
+
+
+def _decode(raw: bytes) -> HandsMessage:
+    try:
+        return decode_msgpack(raw[len(TOPIC_MSGPACK) :])
+    except MessageError as error:
+        raise RecordingError(f"what arrives is no hands message: {error}; is --server the hands' port?") from None
+
+
+def _counts(writer: RecordingWriter) -> str:
+    return f"{writer.counts[BODIES]} frames of bodies, {writer.counts[HANDS]} hands messages"
