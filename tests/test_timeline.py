@@ -209,6 +209,19 @@ def test_a_sender_that_stood_still_and_goes_on_is_followed_again(pause_s: float)
     assert not last.silent
 
 
+def test_a_sender_that_was_only_late_and_catches_up_loses_no_tick_and_repeats_none() -> None:
+    timeline = Timeline()
+    ticks = stream(timeline, np.arange(121) / 120)
+    ticks += carry_on(timeline, 101.0, 104.0)
+    for i in range(121, 601):  # all of three seconds within a tenth of one, then as usual
+        now = 104.0 + (i - 120) / 4800 if i < 481 else 104.0 + (i - 480) / 120
+        timeline.push(i / 120, {"body": screw(i / 120)}, now)
+        ticks += drain(timeline, now)
+    assert [tick.index for tick in ticks] == list(range(len(ticks)))
+    assert not ticks[-1].silent
+    assert timeline.restarts == timeline.skipped_late == 0
+
+
 def test_a_sender_restart_plays_out_the_old_take_and_begins_anew() -> None:
     """The player loops: time goes back to zero without a pause, and no tick of either pass is lost."""
     timeline = Timeline()

@@ -6,6 +6,7 @@ clock carries stream time on, so ticks never stop. The clock is always an argume
 the time.
 """
 
+import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ MAX_LOOK_AHEAD_S: Final = 0.5
 
 SILENCE_S: Final = 0.06
 """Without a frame for this long (or three usual intervals, if longer) our clock carries stream time on."""
-MAX_BACKLOG: Final = 30
+MAX_BACKLOG: Final = 60
 """Ticks due at once beyond which all but the newest are skipped."""
 SLEW: Final = 0.25
 """A changed look-ahead is reached by making ticks this much faster or slower, so none is missing."""
@@ -34,6 +35,8 @@ VANISHED_S: Final = 0.1
 RESTART_S: Final = 0.5
 """A frame this far behind the stream, or `AHEAD_S` ahead of it, may be a sender that started again."""
 AHEAD_S: Final = 0.5
+CATCH_UP_S: Final = 0.25
+"""A sender that was late, not standing still, has this long to deliver what it kept back."""
 WITNESSES: Final = 3
 """Frames in a row that must agree on a new time before it is believed: one bad stamp must not move the
 clock.
@@ -129,6 +132,10 @@ class Run:
         """Stream time if the sender's clock went on since its newest frame."""
         return self.newest_s + (now_s - self.heard_s)
 
+    def index_at(self, t_s: float) -> int:
+        """The first tick at or after an instant."""
+        return math.ceil((t_s - self.t0_s) * TICK_HZ - TIME_TOLERANCE_S)
+
     def tick_s(self, index: int) -> float:
         """The instant of a tick."""
         return self.t0_s + index / TICK_HZ
@@ -148,6 +155,7 @@ class Timeline:
         self._effective_s = look_ahead_s
         self._run: Run | None = None
         self._ending: Run | None = None
+        self._resumed: tuple[int, float] | None = None
         self._senders: dict[str, tuple[str, float]] = {}
         self._witnesses: list[tuple[float, Poses, float]] = []
 
@@ -173,9 +181,8 @@ class Timeline:
             if self._may_send(key, source, now_s):
                 self._senders[key] = (source, now_s)
         self._witnesses.clear()
-        if silent_for > run.silence_s() and self._due_s(run, run.next_index) - t_s > RESTART_S:
-            # Our clock carried the ticks on, but the sender had stood still: its time goes on behind them.
-            run = self._begin(t_s, now_s)
+        if silent_for > run.silence_s() and self._is_ahead_of(run, t_s):
+            self._resumed = (run.index_at(t_s), now_s)
         doubled = run.add(t_s, poses, now_s)
         return "duplicate" if doubled and doubled == len(poses) else None
 
@@ -191,6 +198,7 @@ class Timeline:
                 int((self._ending.newest_s - self._ending.tick_s(self._ending.next_index)) * TICK_HZ), 0
             )
             self._ending = None
+        self._rewind(run, now_s)
         return self._take(run, self._reached_s(run, now_s), now_s)
 
     def next_poll_s(self, now_s: float) -> float:
@@ -223,6 +231,22 @@ class Timeline:
         if now_s >= self._patience_s(run):
             return max(run.arrived_s(), self._due_s(run, run.next_index))
         return run.arrived_s()
+
+    def _is_ahead_of(self, run: Run, t_s: float) -> bool:
+        """Whether our clock has carried the ticks far beyond what a sender says is now."""
+        return self._due_s(run, run.next_index) - t_s > RESTART_S
+
+    def _rewind(self, run: Run, now_s: float) -> None:
+        """Show again from where a sender went on that had stood still, unless it only was late and catches up."""
+        if self._resumed is None:
+            return
+        index, since_s = self._resumed
+        if not self._is_ahead_of(run, run.arrived_s()):
+            self._resumed = None
+        elif now_s - since_s >= CATCH_UP_S and run.arrived_s() >= self._due_s(run, index):
+            self._resumed, run.carried_s = None, None
+            run.next_index, run.number = index, run.number + 1
+            self.restarts += 1
 
     def _patience_s(self, run: Run) -> float:
         """When a tick goes without its frames because our clock had run ahead of a sender that came back.
@@ -275,6 +299,7 @@ class Timeline:
         else:
             self._effective_s = self.look_ahead_s
         self._witnesses.clear()
+        self._resumed = None
         self._run = Run(number, t_s, now_s)
         return self._run
 
