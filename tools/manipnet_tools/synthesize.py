@@ -12,7 +12,8 @@ from rich.progress import Progress
 
 from manipnet.geometry import Array
 from manipnet.network.bundle import DEFAULT_MODEL, load_bundle
-from manipnet.objects.shape import Shape, load_shape
+from manipnet.objects.mesh import closed_mesh, load_mesh
+from manipnet.objects.shape import Shape, build_shape, load_shape
 from manipnet.synthesis import Synthesizer, hand_to_world
 from manipnet.timeline import MAX_LOOK_AHEAD_S
 from manipnet_tools.rollout import Ticks, hand_inputs, roll_out, tick_take
@@ -59,10 +60,17 @@ def read_shapes(meshes: tuple[str, ...], take: Take) -> dict[str, Shape]:
         name, equals, path = text.partition("=")
         if not equals or name not in take.objects:
             raise TakeError(f"--mesh {text}: must be NAME=FILE with NAME one of {', '.join(take.objects) or 'none'}")
-        shapes[name] = load_shape(path)
+        shapes[name] = _centred(path) if take.box_centred else load_shape(path)
     if not shapes:
         raise TakeError(f"no --mesh: at least one of {', '.join(take.objects) or 'none'} needs one")
     return shapes
+
+
+def _centred(path: str) -> Shape:
+    """The shape of a mesh whose origin is moved to the centre of its bounding box."""
+    mesh = load_mesh(path)
+    centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
+    return build_shape(closed_mesh(mesh.vertices - centre, mesh.faces, mesh.name))
 
 
 def synthesise(

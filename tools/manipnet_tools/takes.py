@@ -4,6 +4,7 @@ All are in the project frame: right-handed, Y up, metres, seconds, quaternions x
 `right_wrist` are the wrist frames of `manipnet.hand.skeleton`, the left one its mirror image.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -12,12 +13,18 @@ from numpy.typing import NDArray
 
 from manipnet.geometry import mirror_points, mirror_poses, mirror_quats, quat_multiply, quat_rotate
 from manipnet.hand.skeleton import BONE_COUNT, JOINT_NAMES, OFFSETS_M, PARENTS
+from manipnet.recording import RecordingError, read_bodies
+from manipnet.streams.bodies import BodyFrame
 from manipnet_tools.bvh import Bvh, BvhError, read_bvh
+from manipnet_tools.motive_csv import MotiveCsvError, read_motive_csv
+from manipnet_tools.trajectory import TrajectoryError, read_trajectory
 
 Array = NDArray[np.float64]
 
 SIDES = ("left", "right")
 DECIMETRE_M = 0.1
+RESTART_S = 0.5
+"""A time this far back is a sender that started again."""
 
 
 class TakeError(ValueError):
@@ -49,6 +56,8 @@ class Take:
     time_s: Array
     bodies: dict[str, BodyTrack]
     fingers: dict[str, Fingers] = field(default_factory=dict)
+    box_centred: bool = False
+    """Objects are where the centres of their bounding boxes are, not where their meshes' origins are."""
 
     @property
     def objects(self) -> tuple[str, ...]:
@@ -57,13 +66,78 @@ class Take:
 
 
 def read_take(path: Path | str) -> Take:
-    """Read a take: a folder of BVH files. Raises `TakeError`."""
+    """Read a take: a folder of BVH files, a trajectory text, a Motive CSV or a recording. Raises `TakeError`."""
     path = Path(path)
     if path.is_dir():
         return read_bvh_folder(path)
     if not path.exists():
         raise TakeError(f"{path}: no such take")
-    raise TakeError(f"{path}: unknown kind of take; allowed are a folder of BVH files")
+    readers = {".txt": _read_trajectory, ".csv": _read_motive_csv, ".mcap": _read_recording}
+    if path.suffix.lower() not in readers:
+        raise TakeError(f"{path}: unknown kind of take; allowed are a folder of BVH files, {', '.join(readers)}")
+    try:
+        return readers[path.suffix.lower()](path)
+    except (TrajectoryError, MotiveCsvError, RecordingError) as error:
+        raise TakeError(str(error)) from None
+
+
+def _read_trajectory(path: Path) -> Take:
+    rate_hz, poses = read_trajectory(path)
+    time_s = np.arange(len(poses["object"])) / rate_hz
+    seen = np.ones(len(time_s), dtype=np.bool_)
+    bodies = {name: BodyTrack(track, seen) for name, track in poses.items()}
+    return Take(path.stem, rate_hz, time_s, bodies, box_centred=True)
+
+
+def _read_motive_csv(path: Path) -> Take:
+    """Names such as LeftWrist or "left hand" become the conventional ones; the others stay."""
+    motive = read_motive_csv(path)
+    bodies = {_conventional(name): BodyTrack(*track) for name, track in motive.bodies.items()}
+    return Take(path.stem, motive.rate_hz, motive.time_s, bodies)
+
+
+def _conventional(name: str) -> str:
+    letters = "".join(filter(str.isalpha, name.lower()))
+    sides = [side for side in SIDES if letters in (f"{side}wrist", f"{side}hand")]
+    return f"{sides[0]}_wrist" if sides else name
+
+
+def _read_recording(path: Path) -> Take:
+    """The longest run of a recording's body frames, a run ending where its sender's time began anew."""
+    runs: list[dict[float, BodyFrame]] = []
+    newest_s = np.inf
+    for frame in read_bodies(path):
+        if frame.t_s < newest_s - RESTART_S:
+            runs.append({})
+            newest_s = frame.t_s
+        newest_s = max(newest_s, frame.t_s)
+        runs[-1].setdefault(frame.t_s, frame)
+    if not runs or len(longest := max(runs, key=len)) < 2:
+        raise TakeError(f"{path}: holds no run of body frames")
+    frames = [longest[t_s] for t_s in sorted(longest)]
+    time_s = np.array([frame.t_s for frame in frames])
+    return Take(path.stem, round(1.0 / float(np.median(np.diff(time_s))), 3), time_s - time_s[0], _tracks(frames))
+
+
+def _tracks(frames: Sequence[BodyFrame]) -> dict[str, BodyTrack]:
+    """Tracks by name, or by id for a body without; a lost body stays where it was last, or will be first."""
+    tracks: dict[str, BodyTrack] = {}
+    for k, frame in enumerate(frames):
+        for body in frame.bodies:
+            name = body.name or str(body.id)
+            if name not in tracks:
+                tracks[name] = BodyTrack(np.zeros((len(frames), 7)), np.zeros(len(frames), dtype=np.bool_))
+            if body.tracked:
+                tracks[name].poses[k], tracks[name].tracked[k] = (*body.p, *body.q), True
+    tracks = {name: track for name, track in tracks.items() if track.tracked.any()}
+    for track in tracks.values():
+        track.poses[:] = track.poses[last_tracked(track.tracked)]
+    return tracks
+
+
+def last_tracked(tracked: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """For each frame the last one at which a body was tracked, or else its first such frame."""
+    return np.maximum.accumulate(np.where(tracked, np.arange(len(tracked)), np.argmax(tracked)))
 
 
 def read_bvh_folder(folder: Path) -> Take:

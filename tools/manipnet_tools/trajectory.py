@@ -1,0 +1,68 @@
+"""Trajectory texts, the format the ManipNet dataset gives its motions without fingers in.
+
+The first line is the rate in hertz; every other one has 21 numbers: object, left wrist, right wrist, each a quaternion
+x y z w and a position, left-handed decimetres. The object's position is the centre of its bounding box.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manipnet.geometry import mirror_poses, quat_normalize
+
+Array = NDArray[np.float64]
+
+BODIES = ("object", "left_wrist", "right_wrist")
+COLUMNS = 7 * len(BODIES)
+DECIMETRE_M = 0.1
+
+
+class TrajectoryError(ValueError):
+    """A trajectory text that cannot be read; the text names the file, the place and what was expected."""
+
+
+def read_trajectory(path: Path) -> tuple[float, dict[str, Array]]:
+    """Rate in hertz and poses `(T, 7)` by `BODIES`, in the project frame. Raises `TrajectoryError`."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise TrajectoryError(f"{path}: cannot be read ({error})") from None
+    rate_hz = _rate(lines[0] if lines else "", path)
+    rows = [_row(line, f"{path}:{number}") for number, line in enumerate(lines[1:], start=2) if line.strip()]
+    if not rows:
+        raise TrajectoryError(f"{path}: holds no frame; every line after the first is one")
+    values = np.array(rows).reshape(len(rows), len(BODIES), 7)
+    poses = {
+        name: np.concatenate([DECIMETRE_M * values[:, i, 4:], values[:, i, :4]], 1) for i, name in enumerate(BODIES)
+    }
+    if lost := [name for name, track in poses.items() if np.linalg.norm(track[:, 3:], axis=1).min() < 1e-6]:
+        raise TrajectoryError(f"{path}: {lost[0]} has a zero quaternion; a trajectory text has no lost frames")
+    return rate_hz, {name: _project(track) for name, track in poses.items()}
+
+
+def _project(poses: Array) -> Array:
+    return mirror_poses(np.concatenate([poses[:, :3], quat_normalize(poses[:, 3:])], axis=1))
+
+
+def _rate(line: str, path: Path) -> float:
+    try:
+        rate_hz = float(line)
+    except ValueError:
+        rate_hz = 0.0
+    if not 1.0 <= rate_hz <= 1000.0:
+        raise TrajectoryError(f"{path}:1: {line[:40]!r} is no rate; the first line must be 1 to 1000 Hz, as 120")
+    return rate_hz
+
+
+def _row(line: str, where: str) -> list[float]:
+    cells = line.split(",")
+    if len(cells) != COLUMNS:
+        raise TrajectoryError(f"{where}: {len(cells)} values; a frame has {COLUMNS}, separated by commas")
+    try:
+        row = [float(cell) for cell in cells]
+    except ValueError as error:
+        raise TrajectoryError(f"{where}: {error}") from None
+    if not np.isfinite(row).all():
+        raise TrajectoryError(f"{where}: a value is not finite")
+    return row
