@@ -1,7 +1,6 @@
 """`manipnet record`: what a running server hears of the bodies and says of the hands, or what a tracker sends."""
 
 import json
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -77,7 +76,7 @@ def run(options: RecordOptions) -> None:
             return not (stopping.is_set() or too_long)
 
         if options.bodies_port is not None:
-            record_bodies(options.bodies_port, writer, stopping, going_on)
+            record_bodies(options.bodies_port, writer, going_on, lambda where: progress.print(f"listening on {where}"))
         else:
             record_hands(options.server, options.keys, options.actor, writer, going_on)
     Console(stderr=True).print(f"wrote {options.out}: {_counts(writer)}")
@@ -102,13 +101,16 @@ def record_hands(
                     writer.write_hands(message, now_ns)
 
 
-def record_bodies(port: int, writer: RecordingWriter, stopping: threading.Event, going_on: Callable[[], bool]) -> None:
-    """Write every body frame sent to this machine's `port` while `going_on`."""
+def record_bodies(
+    port: int, writer: RecordingWriter, going_on: Callable[[], bool], listening: Callable[[str], None]
+) -> None:
+    """Write every body frame sent to this machine's `port` while `going_on`; `listening` hears the address."""
     receiver = ZmqBodies(lambda frame: writer.write_bodies(frame, time.time_ns()), Counters(), port=port)
     receiver.start()
     try:
+        listening(receiver.address)
         while going_on():
-            stopping.wait(1e-3 * POLL_MS)
+            time.sleep(1e-3 * POLL_MS)
     finally:
         receiver.stop()
 
