@@ -143,6 +143,14 @@ def test_a_tick_falls_due_with_the_frame_that_completes_its_look_ahead(look_ahea
             assert tick.waited_for_s == 50.0 + t
 
 
+def test_a_tick_that_is_polled_late_knows_since_when_it_was_due() -> None:
+    timeline = Timeline(0.1)
+    for i in range(60):
+        timeline.push(i / 120, {"body": screw(i / 120)}, 50.0 + i / 120)
+    for tick in drain(timeline, 51.0)[:20]:
+        assert tick.waited_for_s == pytest.approx(50.0 + tick.time_s + 0.1, abs=1e-6)
+
+
 def test_beyond_the_look_ahead_the_future_is_forecast() -> None:
     tick = whole_take(120.0, 1.5, look_ahead_s=0.1)[60]
     window, truth = tick.bodies["body"].window, screw(tick.time_s + WINDOW_OFFSETS_S)

@@ -100,6 +100,7 @@ class Run:
         self.carried_s: float | None = None
         """When our clock, not a frame, let the newest tick go."""
         self._gaps_s = deque[float](maxlen=32)
+        self._arrivals = deque[tuple[float, float]](maxlen=1024)
 
     def add(self, t_s: float, poses: Poses, now_s: float) -> int:
         """Take a frame; a pose of None is a body that is not tracked. Returns how many poses were
@@ -108,6 +109,7 @@ class Run:
         if t_s > self.newest_s:
             self._gaps_s.append(now_s - self.heard_s)
             self.newest_s, self.heard_s = t_s, now_s
+            self._arrivals.append((t_s, now_s))
         doubled = 0
         for key, pose in poses.items():
             track = self.tracks.setdefault(key, BodyTrack())
@@ -127,6 +129,12 @@ class Run:
             if 0.0 < lag <= min(2.5 * track.interval_s(), VANISHED_S):
                 reached = min(reached, track.seen_s)
         return reached
+
+    def completed_s(self, due_s: float) -> float:
+        """Our clock when the stream reached `due_s`, by a frame or in a silence. Ask with rising times."""
+        while self._arrivals and self._arrivals[0][0] < due_s - TIME_TOLERANCE_S:
+            self._arrivals.popleft()
+        return self._arrivals[0][1] if self._arrivals else self.heard_s + due_s - self.newest_s
 
     def clock_s(self, now_s: float) -> float:
         """Stream time if the sender's clock went on since its newest frame."""
@@ -282,8 +290,8 @@ class Timeline:
                 key: BodyAtTick(rows, rows[PRESENT], track.age_s(time_s))
                 for (key, track), rows in zip(tracks.items(), poses, strict=True)
             }
-        waited_for_s = max(run.heard_s, run.heard_s + due_s - run.newest_s)
-        return Tick(run.number, index, time_s, self._effective_s, min(waited_for_s, now_s), silent, bodies)
+        waited_for_s = min(run.completed_s(due_s), now_s)
+        return Tick(run.number, index, time_s, self._effective_s, waited_for_s, silent, bodies)
 
     def _slew(self) -> None:
         step = SLEW * TICK_S
