@@ -30,7 +30,7 @@ TARGET_WEIGHT = 1.0
 SURFACE_WEIGHT = 6.0
 STAY_WEIGHT_M2 = 4e-5
 """Pull toward the network's angles, in square metres per square radian."""
-ALLOWED_DEPTH_M = 0.001
+ALLOWED_DEPTH_M = 0.002
 """Skin gives: the captured fingers are about this deep where they press."""
 PULL_WEIGHT = 3.0
 PULL_REACH_M = 0.012
