@@ -31,7 +31,7 @@ def _csharp(folder: Path) -> list[str]:
 
 
 def _gcc(folder: Path) -> list[str]:
-    return _cpp(need("g++")[0], folder / "gcc", "-O1", "-g", *SANITIZERS)
+    return _cpp(need("g++")[0], folder / "gcc", "-g", *SANITIZERS)
 
 
 def _clang(folder: Path) -> list[str]:

@@ -9,6 +9,9 @@ from collections.abc import Iterator
 
 MORE, LONG, COMMAND = 1, 2, 4
 GREETING = b"\xff" + bytes(8) + b"\x7f\x03\x01" + b"NULL".ljust(20, b"\0") + bytes(32)
+SIGNATURE_BYTES = 11
+"""What to send before reading: a server that dislikes the rest hangs up without saying which mechanism it wants."""
+
 RECEIVE_BYTES = 262_144
 PING = b"\x04PING\x00\x00"  # no time to live: libzmq would cut us off once frames flow and pings stop
 PING_AFTER_S, DEAD_AFTER_S = 1.0, 3.0
@@ -70,13 +73,14 @@ class Subscription:
             self._send(COMMAND, PING)
 
     def _handshake(self, topic: bytes) -> None:
-        self._socket.sendall(GREETING)
+        self._socket.sendall(GREETING[:SIGNATURE_BYTES])
         greeting = self._read(64)
         if greeting[0] != 0xFF or not greeting[9] & 1 or greeting[10] < 3:
             raise ZmtpError("the other side does not speak ZMTP 3")
         if greeting[12:32].rstrip(b"\0") != b"NULL":
             mechanism = greeting[12:32].rstrip(b"\0").decode("ascii", "replace")
             raise ZmtpError(f"the server asks for {mechanism}; this client speaks NULL only: use a tunnel")
+        self._socket.sendall(GREETING[SIGNATURE_BYTES:])
         self._send(COMMAND, b"\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB")
         while not (ready := self._next_frame()):
             self._receive()

@@ -13,6 +13,7 @@ namespace ManipNet.Client
     public sealed class ZmtpSubscriber
     {
         const int More = 1, Long = 2, Command = 4;
+        const int SignatureBytes = 11;
         const int ConnectMs = 2000, WaitMs = 250, SliceMs = 50;
         const double PingAfterS = 1.0, DeadAfterS = 3.0;
         static readonly byte[] Ping = { Command, 7, 4, (byte)'P', (byte)'I', (byte)'N', (byte)'G', 0, 0 };
@@ -176,13 +177,14 @@ namespace ManipNet.Client
             greeting[10] = 3;
             greeting[11] = 1;
             Encoding.ASCII.GetBytes("NULL", 0, 4, greeting, 12);
-            _socket.Send(greeting);
+            _socket.Send(greeting, 0, SignatureBytes, SocketFlags.None); // all at once, and some hang up unexplained
             while (_end < 64) ReceiveGreeting();
             if (Buffer[0] != 0xFF || (Buffer[9] & 1) == 0 || Buffer[10] < 3) throw new IOException("the other side does not speak ZMTP 3");
             string mechanism = Encoding.ASCII.GetString(Buffer, 12, 20).TrimEnd('\0');
             if (mechanism != "NULL") throw new IOException("the server asks for " + mechanism + "; this client speaks NULL only: use a tunnel");
             bool byCommand = Buffer[11] >= 1;
             _resume = 64;
+            _socket.Send(greeting, SignatureBytes, 64 - SignatureBytes, SocketFlags.None);
             Send(Command, Encoding.ASCII.GetBytes("\x05READY\x0bSocket-Type\0\0\0\x03SUB"));
             while (!NextFrame()) ReceiveGreeting();
             if ((_flags & Command) == 0 || !StartsWith("\x05READY")) throw new IOException("the server refused the connection");

@@ -16,7 +16,9 @@ constexpr int kWaitMs = 250;
 constexpr double kPingAfterS = 1.0;
 constexpr double kDeadAfterS = 3.0;
 constexpr std::size_t kGreetingBytes = 64;
+constexpr std::size_t kSignatureBytes = 11;
 constexpr std::size_t kMechanism = 12;
+constexpr std::size_t kMechanismBytes = 20;
 
 }  // namespace
 
@@ -53,14 +55,17 @@ std::string ZmtpSubscriber::Handshake(const std::string& topic) {
     greeting[10] = 3;
     greeting[11] = 1;
     std::memcpy(greeting + kMechanism, "NULL", 4);
-    const std::string error = Connection.Send(greeting, sizeof greeting);
+    std::string error = Connection.Send(greeting, kSignatureBytes);  // all at once, and some hang up unexplained
     if (!error.empty()) return error;
     if (!FillUntil(kGreetingBytes)) return Failure;
     if (Buffer[0] != 0xFF || (Buffer[9] & 1) == 0 || Buffer[10] < 3) return "the other side does not speak ZMTP 3";
-    if (std::memcmp(Buffer.data() + kMechanism, "NULL\0", 5) != 0)
-        return "the server asks for encryption; this client speaks NULL only: use a tunnel";
+    const auto* name = reinterpret_cast<const char*>(Buffer.data() + kMechanism);
+    const std::string mechanism(name, std::find(name, name + kMechanismBytes, '\0'));
+    if (mechanism != "NULL") return "the server asks for " + mechanism + "; this client speaks NULL only: use a tunnel";
     const bool byCommand = Buffer[11] >= 1;
     Resume = kGreetingBytes;
+    error = Connection.Send(greeting + kSignatureBytes, kGreetingBytes - kSignatureBytes);
+    if (!error.empty()) return error;
     static constexpr char kReady[] = "\x05READY\x0bSocket-Type\0\0\0\x03SUB";
     if (!Send(kCommand, kReady, sizeof kReady - 1)) return Failure;
     while (!NextFrame())
