@@ -19,24 +19,15 @@ from manipnet.geometry import (
     quat_multiply,
     transform,
 )
-from manipnet.hand.kinematics import angles_from_rotations_into, forward_kinematics, forward_kinematics_into
-from manipnet.ik.ccd import solve_ccd
-from manipnet.ik.chains import clamp
-from manipnet.ik.least_squares import solve_least_squares
-from manipnet.ik.targets import place_targets
-from manipnet.kernels import njit
+from manipnet.hand.kinematics import forward_kinematics, forward_kinematics_into
+from manipnet.ik.correct import CORRECTIONS, SOLVERS, SolverName
 from manipnet.network.bundle import Bundle
+from manipnet.network.decode import decode_into
 from manipnet.network.features import Windows, features
-from manipnet.network.layout import OUTPUT, OUTPUT_DISTANCE_MAX_M, PRESENT
+from manipnet.network.layout import PRESENT
 from manipnet.objects.shape import Shape
-from manipnet.sensing.scene import object_from_wrist
 
 Side = Literal["left", "right"]
-SolverName = Literal["least_squares", "ccd", "none"]
-SOLVERS: tuple[SolverName, ...] = ("least_squares", "ccd", "none")
-
-CORRECTION_SHARE = 0.5
-"""How much of the way to a new correction a tick goes: half of it in one tick."""
 ABSENT_HAND_M = 0.45
 """Distance at which a hand that is not tracked is assumed to be."""
 
@@ -128,7 +119,7 @@ class Synthesizer:
         """`on_stage` hears the name of each stage as it ends: `sense`, `infer`, `ik`."""
         if solver not in SOLVERS:
             raise ValueError(f"solver {solver!r} is unknown; allowed are {', '.join(SOLVERS)}")
-        self._bundle, self._solver, self._on_stage = bundle, solver, on_stage
+        self._bundle, self._correct, self._on_stage = bundle, CORRECTIONS.get(solver), on_stage
 
     def rest_state(self) -> HandState:
         """The neutral pose every hand starts from."""
@@ -157,15 +148,15 @@ class Synthesizer:
         return [step for step in steps if step is not None]
 
     def _pose(self, output: Array, scene: HandScene, state: HandState, windows: Windows, index: int) -> HandStep:
-        shape, limits = scene.shape, self._bundle.limits
-        angles, positions, rotations = np.empty(20), np.empty((22, 3)), np.empty((17, 3, 3))
-        raw_positions, distances, correction = np.empty((22, 3)), np.empty(22), state.correction.copy()
-        _pose_kernel(
-            output,
-            state.angles,
-            self._bundle.response,
-            limits,
-            SOLVERS.index(self._solver),
+        shape, bundle = scene.shape, self._bundle
+        angles, distances, correction = np.empty(20), np.empty(22), state.correction.copy()
+        raw_positions, positions = np.empty((22, 3)), np.empty((22, 3))
+        rotations, axes = np.empty((17, 3, 3)), np.empty((20, 3))
+        decode_into(output, state.angles, bundle.response, bundle.limits, rotations, angles, distances)
+        forward_kinematics_into(angles, raw_positions, rotations, axes)
+        if self._correct is None:
+            return HandStep(HandState(angles, raw_positions, rotations, correction), distances, raw_positions)
+        self._correct(
             shape.bvh,
             shape.field,
             shape.exact_within_m,
@@ -173,13 +164,13 @@ class Synthesizer:
             windows.object[index, PRESENT],
             windows.mirrored[index],
             windows.scale[index],
-            angles,
-            positions,
-            rotations,
             raw_positions,
             distances,
+            bundle.limits,
+            angles,
             correction,
         )
+        forward_kinematics_into(angles, positions, rotations, axes)
         return HandStep(HandState(angles, positions, rotations, correction), distances, raw_positions)
 
 
@@ -194,78 +185,3 @@ def _subset(windows: Windows, members: np.ndarray) -> Windows:
     if len(members) == len(windows.wrist):
         return windows
     return Windows(*(values[members] for values in windows))
-
-
-_OUT_AXES, _OUT_DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
-
-
-@njit(cache=True, nogil=True)
-def rotations_from_axes_into(output, rotations):
-    """Rotations `(17, 3, 3)` from the two axes per bone of a network output, by Gram and Schmidt."""
-    for bone in range(17):
-        x = output[_OUT_AXES + 6 * bone : _OUT_AXES + 6 * bone + 3]
-        y = output[_OUT_AXES + 6 * bone + 3 : _OUT_AXES + 6 * bone + 6]
-        x = x / max(np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2), 1e-9)
-        y = y - x * (x[0] * y[0] + x[1] * y[1] + x[2] * y[2])
-        y = y / max(np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2), 1e-9)
-        for i in range(3):
-            rotations[bone, i, 0], rotations[bone, i, 1] = x[i], y[i]
-        rotations[bone, 0, 2] = x[1] * y[2] - x[2] * y[1]
-        rotations[bone, 1, 2] = x[2] * y[0] - x[0] * y[2]
-        rotations[bone, 2, 2] = x[0] * y[1] - x[1] * y[0]
-
-
-@njit(cache=True, nogil=True)
-def _pose_kernel(
-    output, before, response, limits, solver, bvh, field, exact_within_m, wrist, obj, mirrored, scale,
-    angles, positions, rotations, raw_positions, distances, correction,
-):  # fmt: skip
-    axes, targets = np.empty((20, 3)), np.empty((22, 3))
-    rotations_from_axes_into(output, rotations)
-    # bone rotations are relative to a wrist that is the frame itself
-    for i in range(3):
-        for j in range(3):
-            rotations[0, i, j] = 1.0 if i == j else 0.0
-    angles_from_rotations_into(rotations, angles)
-    for dof in range(20):
-        angles[dof] = clamp(before[dof] + response * (angles[dof] - before[dof]), limits, dof)
-    for j in range(22):
-        distances[j] = min(max(output[_OUT_DISTANCES + j], 0.0), OUTPUT_DISTANCE_MAX_M)
-    forward_kinematics_into(angles, raw_positions, rotations, axes)
-    if solver == 2:
-        correction[:] = 0.0
-    else:
-        predicted = angles.copy()
-        rotation, translation = np.empty((3, 3)), np.empty(3)
-        object_from_wrist(wrist, obj, mirrored, rotation, translation)
-        place_targets(
-            bvh, field, rotation, translation, scale, exact_within_m,
-            raw_positions, distances, targets,
-        )  # fmt: skip
-        if solver == 1:
-            solve_ccd(angles, targets, limits)
-        else:
-            solve_least_squares(angles, targets, distances, limits, field, rotation, translation, scale)
-        # corrections fade in and out over a few ticks instead of popping
-        for dof in range(20):
-            correction[dof] += CORRECTION_SHARE * (angles[dof] - predicted[dof] - correction[dof])
-            angles[dof] = clamp(predicted[dof] + correction[dof], limits, dof)
-    forward_kinematics_into(angles, positions, rotations, axes)
-
-
-@njit(cache=True, nogil=True)
-def _angles_from_outputs(outputs, limits, angles):
-    rotations = np.empty((17, 3, 3))
-    for n in range(len(outputs)):
-        rotations_from_axes_into(outputs[n], rotations)
-        rotations[0] = np.eye(3)
-        angles_from_rotations_into(rotations, angles[n])
-        for dof in range(20):
-            angles[n, dof] = clamp(angles[n, dof], limits, dof)
-
-
-def angles_from_outputs(outputs: Array, limits: Array) -> Array:
-    """Angles `(N, 20)` inside `limits` that network outputs `(N, 220)` say, before inverse kinematics."""
-    angles = np.empty((len(outputs), 20))
-    _angles_from_outputs(outputs, limits, angles)
-    return angles

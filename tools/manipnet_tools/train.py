@@ -15,8 +15,8 @@ import torch
 from manipnet.geometry import Array
 from manipnet.hand.skeleton import DOF_NAMES
 from manipnet.network.bundle import FORMAT
+from manipnet.network.decode import angles_from_outputs
 from manipnet.network.layout import describe
-from manipnet.synthesis import angles_from_outputs
 from manipnet_tools.compress import halve_weights
 from manipnet_tools.dataset import TICK_FRAMES, HandTrack, Samples, concatenate, load_tracks
 from manipnet_tools.model import Architecture, ManipNet, export_onnx, normalisation

@@ -36,6 +36,22 @@ def axis_rotation_into(axis, angle, out):
 
 
 @njit(cache=True, nogil=True)
+def _copy_into(a, out):
+    # a slice assignment would compile numpy's broadcasting, with its error texts, for seconds
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = a[i, j]
+
+
+@njit(cache=True, nogil=True)
+def set_identity(out):
+    """The identity into `out (3, 3)`."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 1.0 if i == j else 0.0
+
+
+@njit(cache=True, nogil=True)
 def _multiply_into(a, b, out):
     for i in range(3):
         for j in range(3):
@@ -55,12 +71,12 @@ def forward_kinematics_into(angles, positions, rotations, axes):
     """Pose of one hand: `angles (20,)` into `positions (22, 3)`, `rotations (17, 3, 3)`, hinge `axes (20, 3)`."""
     hinge, turned = np.empty((3, 3)), np.empty((3, 3))
     positions[0] = 0.0
-    rotations[0] = np.eye(3)
+    set_identity(rotations[0])
     for bone in range(1, BONE_COUNT):
         parent = PARENTS[bone]
         _apply_offset_into(positions[parent], rotations[parent], OFFSETS_M[bone], positions[bone])
         frame = rotations[bone]
-        frame[:] = rotations[parent]
+        _copy_into(rotations[parent], frame)
         for dof in range(_FIRST_DOF[bone], _FIRST_DOF[bone] + _DOFS_OF_BONE[bone]):
             for i in range(3):
                 axes[dof, i] = (
@@ -68,9 +84,9 @@ def forward_kinematics_into(angles, positions, rotations, axes):
                 )
             axis_rotation_into(DOF_AXES[dof], angles[dof], hinge)
             _multiply_into(frame, hinge, turned)
-            frame[:] = turned
+            _copy_into(turned, frame)
         _multiply_into(frame, _REST[bone], turned)
-        frame[:] = turned
+        _copy_into(turned, frame)
     for tip in range(BONE_COUNT, JOINT_COUNT):
         parent = PARENTS[tip]
         _apply_offset_into(positions[parent], rotations[parent], OFFSETS_M[tip], positions[tip])
@@ -89,19 +105,37 @@ def _hinge_angle(m, axis):
 
 
 @njit(cache=True, nogil=True)
+def _turn_about(u, v, m):
+    """Angle about the unit axis `u` that turns `v` into the direction of `m v`, seen along the axis."""
+    x = m[0, 0] * v[0] + m[0, 1] * v[1] + m[0, 2] * v[2]
+    y = m[1, 0] * v[0] + m[1, 1] * v[1] + m[1, 2] * v[2]
+    z = m[2, 0] * v[0] + m[2, 1] * v[1] + m[2, 2] * v[2]
+    sine = u[0] * (v[1] * z - v[2] * y) + u[1] * (v[2] * x - v[0] * z) + u[2] * (v[0] * y - v[1] * x)
+    along = (u[0] * v[0] + u[1] * v[1] + u[2] * v[2]) * (u[0] * x + u[1] * y + u[2] * z)
+    return np.arctan2(sine, v[0] * x + v[1] * y + v[2] * z - along)
+
+
+@njit(cache=True, nogil=True)
 def angles_from_rotations_into(rotations, angles):
     """The 20 angles whose hand is nearest to bone `rotations (17, 3, 3)`, joint by joint, into `angles (20,)`."""
     local, work, back = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     for bone in range(1, BONE_COUNT):
-        _multiply_into(rotations[PARENTS[bone]].T, rotations[bone], work)
-        _multiply_into(work, _REST[bone].T, local)
+        parent = rotations[PARENTS[bone]]
+        for i in range(3):
+            for j in range(3):
+                work[i, j] = 0.0
+                for k in range(3):
+                    work[i, j] += parent[k, i] * rotations[bone, k, j]
+        for i in range(3):
+            for j in range(3):
+                local[i, j] = 0.0
+                for k in range(3):
+                    local[i, j] += work[i, k] * _REST[bone, j, k]
         first = _FIRST_DOF[bone]
         if _DOFS_OF_BONE[bone] == 2:
             u, v = DOF_AXES[first], DOF_AXES[first + 1]
             # local = R(u, flexion) R(v, abduction) leaves v where the flexion alone puts it
-            moved = local @ v
-            flat, turned = v - u * (u @ v), moved - u * (u @ moved)
-            angles[first] = np.arctan2(u @ np.cross(flat, turned), flat @ turned)
+            angles[first] = _turn_about(u, v, local)
             axis_rotation_into(u, -angles[first], back)
             _multiply_into(back, local, work)
             angles[first + 1] = _hinge_angle(work, v)

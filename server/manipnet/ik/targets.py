@@ -20,7 +20,8 @@ def mix_distances(predicted, measured):
 def place_targets(bvh, field, rotation, translation, scale, exact_within_m, positions, distances, targets):
     """Targets `(22, 3)` in the wrist frame from predicted joint `positions (22, 3)` and `distances (22,)`, metres."""
     for j in range(len(positions)):
-        targets[j] = positions[j]
+        for i in range(3):
+            targets[j, i] = positions[j, i]
         if distances[j] > NEAR_M:
             continue
         x, y, z = map_point(rotation, translation, scale, positions[j, 0], positions[j, 1], positions[j, 2])

@@ -119,26 +119,27 @@ def _pose_rows(positions, rotations, rows):
 @njit(cache=True, nogil=True)
 def _rotation_vector_into(m, out):
     """Logarithm of a rotation matrix by way of its quaternion's vector part; exact for the small turns of a window."""
-    sine_axis = 0.5 * np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]])
-    sine = np.sqrt(sine_axis[0] ** 2 + sine_axis[1] ** 2 + sine_axis[2] ** 2)
+    x, y, z = 0.5 * (m[2, 1] - m[1, 2]), 0.5 * (m[0, 2] - m[2, 0]), 0.5 * (m[1, 0] - m[0, 1])
+    sine = np.sqrt(x * x + y * y + z * z)
     angle = np.arctan2(sine, 0.5 * (m[0, 0] + m[1, 1] + m[2, 2] - 1.0))
     factor = 1.0 if sine < 1e-9 else angle / sine
-    for i in range(3):
-        out[i] = factor * sine_axis[i]
+    out[0], out[1], out[2] = factor * x, factor * y, factor * z
 
 
 @njit(cache=True, nogil=True)
 def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
     w0, w, o = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    before, turn, spin = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    before, turn, spin, center = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     quat_to_matrix_into(wrist[PRESENT, 3:], w0)
     origin = wrist[PRESENT]
     for t in range(_WINDOW):
         quat_to_matrix_into(wrist[t, 3:], w)
-        before[:] = o
-        quat_to_matrix_into(obj[t, 3:], o)
-        center = np.zeros(3)
         for i in range(3):
+            for j in range(3):
+                before[i, j] = o[i, j]
+        quat_to_matrix_into(obj[t, 3:], o)
+        for i in range(3):
+            center[i] = 0.0
             for j in range(3):
                 flip = -1.0 if mirrored and j == 0 else 1.0
                 center[i] += o[i, j] * flip * center_of_mass[j] * scale
@@ -194,7 +195,8 @@ def _features_without_rays(
             object_from_wrist(windows.wrist[n, t], windows.object[n, t], windows.mirrored[n], rotation, translation)
             aim_rays(rotation, translation, scale, points, directions, rays[0, n, s], rays[1, n, s])
             sense_distances(bvh, field, rotation, translation, scale, exact_within_m, positions[n], distances, normals)
-            row[_DISTANCES + 22 * s : _DISTANCES + 22 * (s + 1)] = distances
+            for j in range(22):
+                row[_DISTANCES + 22 * s + j] = distances[j]
             if s == 0:
                 sense_ambient(field, rotation, translation, scale, row[_AMBIENT : _AMBIENT + 1000])
                 for j in range(22):

@@ -238,7 +238,7 @@ def closest_point(bvh, px, py, pz, seed):
 def closest_points_parallel(bvh, points, distance, closest, triangle):
     """Unseeded closest points of many `points (N, 3)` on all cores, for building fields and for tools."""
     for i in prange(len(points)):
-        d, x, y, z, t, _ = closest_point(bvh, points[i, 0], points[i, 1], points[i, 2], -1)
+        d, x, y, z, t, _ = closest_point(bvh, points[i, 0], points[i, 1], points[i, 2], np.int32(-1))
         distance[i], triangle[i] = d, t
         closest[i, 0], closest[i, 1], closest[i, 2] = x, y, z
 

@@ -30,8 +30,8 @@ SENSORS = Sensors(SENSOR_BONES, SENSOR_WEIGHTS, SENSOR_POINTS, SENSOR_NORMALS)
 def place_sensors(sensors, positions, rotations, points, normals):
     """Skin the sensors to a pose: `positions (22, 3)`, `rotations (17, 3, 3)` into `points`, `normals (104, 3)`."""
     for s in range(SENSOR_COUNT):
-        points[s] = 0.0
-        normals[s] = 0.0
+        for i in range(3):
+            points[s, i] = normals[s, i] = 0.0
         for k in range(sensors.bones.shape[1]):
             weight, bone = sensors.weights[s, k], sensors.bones[s, k]
             if weight == 0.0:
@@ -44,7 +44,8 @@ def place_sensors(sensors, positions, rotations, points, normals):
                 points[s, i] += weight * p
                 normals[s, i] += weight * n
         length = np.sqrt(normals[s, 0] ** 2 + normals[s, 1] ** 2 + normals[s, 2] ** 2)
-        normals[s] /= length
+        for i in range(3):
+            normals[s, i] /= length
 
 
 @njit(cache=True, nogil=True)
