@@ -54,7 +54,7 @@ class HandTrack:
             np.ones(len(frames)),
         )
 
-    def angles_at(self, at: Array) -> Array:
+    def angles_at(self, at: np.ndarray) -> Array:
         """Captured angles at fractional frames `(N,)`, `(N, 20)`."""
         return _between(self.angles, np.clip(at, 0, len(self) - 1))
 

@@ -98,7 +98,7 @@ def main() -> None:
     """Write the data file into the package."""
     path = Path(manipnet.hand.__path__[0]) / "surface.npz"
     arrays = build()
-    np.savez_compressed(path, **arrays)
+    np.savez_compressed(path, allow_pickle=False, **arrays)
     print(f"{path}: {len(arrays['vertices'])} vertices, {len(arrays['faces'])} faces, {path.stat().st_size} bytes")
 
 

@@ -114,6 +114,11 @@ class ResidualDenseBlock(nn.Module):
 class ManipNet(nn.Module):
     """The network: three linear encoders, two residual dense blocks, a linear decoder. SI units in and out."""
 
+    input_mean: torch.Tensor
+    input_gain: torch.Tensor
+    output_mean: torch.Tensor
+    output_std: torch.Tensor
+
     def __init__(
         self,
         norm: Normalisation,
@@ -173,7 +178,7 @@ def export_onnx(model: ManipNet) -> bytes:
         torch.onnx.export(
             model,
             (torch.zeros(2, INPUT_SIZE),),
-            buffer,
+            buffer,  # pyright: ignore[reportArgumentType]: the older exporter takes files
             dynamo=False,
             input_names=["features"],
             output_names=["outputs"],

@@ -45,7 +45,7 @@ class Stretch:
 
 def random_stretch(shape: Shape, rng: np.random.Generator, amount: float = 0.25) -> Stretch:
     """Stretches by up to `exp(±amount)` along three random perpendicular directions."""
-    turn = Rotation.random(random_state=rng).as_matrix()
+    turn = Rotation.from_quat(rng.normal(size=4)).as_matrix()
     return Stretch(turn @ np.diag(np.exp(rng.uniform(-amount, amount, 3))) @ turn.T, shape.center_of_mass)
 
 

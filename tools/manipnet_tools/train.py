@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import torch
@@ -106,7 +107,7 @@ def train(tracks: Sequence[HandTrack], config: TrainConfig, share: float = 1.0) 
     total = config.rounds * config.epochs_per_round
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, total, config.learning_rate / 50)
     for turn in range(config.rounds):
-        policy = None if turn == 0 else policy_of(average.module, limits)
+        policy = None if turn == 0 else policy_of(cast(ManipNet, average.module), limits)
         samples = first if turn == 0 else _make(tracks, spans, config, pool, limits, rng, policy)
         for _ in range(config.epochs_per_round):
             loss = _epoch(model, average, optimizer, samples, config.batch, rng)
@@ -115,7 +116,7 @@ def train(tracks: Sequence[HandTrack], config: TrainConfig, share: float = 1.0) 
             "round %d/%d  %d samples  loss %.4f  %.0f s",
             turn + 1, config.rounds, len(samples), loss, time.monotonic() - started,
         )  # fmt: skip
-    shipped = average.module if config.average else model
+    shipped = cast(ManipNet, average.module) if config.average else model
     takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
     return Trained(shipped.eval(), rest, limits, config, takes, share, time.monotonic() - started)
 

@@ -56,7 +56,7 @@ OFFSETS_M: Final = np.array(
 )
 """Offset of each joint in its parent bone's frame, `(22, 3)`."""
 
-REST_QUATS: Final = np.array(
+_REST_QUATS = np.array(
     [
         [0.0, 0.0, 0.0, 1.0],
         [0.332704, 0.388948, 0.493294, 0.703341],
@@ -77,7 +77,7 @@ REST_QUATS: Final = np.array(
         [0.003854, 0.048684, -0.066144, 0.996614],
     ]
 )
-REST_QUATS /= np.linalg.norm(REST_QUATS, axis=1, keepdims=True)
+REST_QUATS: Final = _REST_QUATS / np.linalg.norm(_REST_QUATS, axis=1, keepdims=True)
 """Local rotation of each bone when its angles are zero, `(17, 4)` xyzw."""
 
 _DOFS = (
@@ -108,8 +108,8 @@ DOF_NAMES: Final = tuple(dof[0] for dof in _DOFS)
 DOF_JOINTS: Final = np.array([dof[1] for dof in _DOFS])
 """The bone each angle turns, `(20,)`."""
 
-DOF_AXES: Final = np.array([dof[2] for dof in _DOFS])
-DOF_AXES /= np.linalg.norm(DOF_AXES, axis=1, keepdims=True)
+_DOF_AXES = np.array([dof[2] for dof in _DOFS])
+DOF_AXES: Final = _DOF_AXES / np.linalg.norm(_DOF_AXES, axis=1, keepdims=True)
 """Unit hinge axes in the parent bone's frame at angle zero, `(20, 3)`."""
 
 DOF_LIMITS_RAD: Final = np.radians(np.array([dof[3] for dof in _DOFS], dtype=np.float64))

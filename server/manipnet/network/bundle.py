@@ -38,7 +38,7 @@ class Bundle:
 
     def infer(self, rows: np.ndarray) -> np.ndarray:
         """Network outputs `(N, 220)` of feature rows `(N, 2356)` float32, both in SI units."""
-        return self.session.run(None, {"features": rows})[0]
+        return np.asarray(self.session.run(None, {"features": rows})[0])
 
 
 def models_folder() -> Path:

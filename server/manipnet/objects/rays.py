@@ -11,8 +11,10 @@ from manipnet.objects.bvh import Bvh, trace_ray
 try:
     from embreex.mesh_construction import TriangleMesh
     from embreex.rtcore_scene import EmbreeScene
+
+    HAS_EMBREE = True
 except ImportError:  # no wheel for this platform (Linux ARM)
-    EmbreeScene = None
+    HAS_EMBREE = False
 
 
 class RayScene(Protocol):
@@ -37,11 +39,11 @@ class EmbreeRays:
 
     def trace(self, origins: Array, directions: Array) -> tuple[np.ndarray, np.ndarray]:
         """See `RayScene.trace`."""
-        origins = np.ascontiguousarray(origins, dtype=np.float32)
-        directions = np.ascontiguousarray(directions, dtype=np.float32)
-        hits = self._scene.run(origins, directions, query="INTERSECT", output=True)
+        starts = np.ascontiguousarray(origins, dtype=np.float32)
+        aims = np.ascontiguousarray(directions, dtype=np.float32)
+        hits = self._scene.run(starts, aims, query="INTERSECT", output=True)
         missed = hits["primID"] < 0
-        facing_away = np.einsum("ij,ij->i", hits["Ng"], directions) > 0.0
+        facing_away = np.einsum("ij,ij->i", hits["Ng"], aims) > 0.0
         return np.where(missed, np.inf, hits["tfar"]), facing_away & ~missed
 
 
@@ -66,7 +68,7 @@ class TreeRays:
 
 def ray_scene(bvh: Bvh) -> RayScene:
     """The fastest ray scene this platform has."""
-    return TreeRays(bvh) if EmbreeScene is None else EmbreeRays(bvh)
+    return EmbreeRays(bvh) if HAS_EMBREE else TreeRays(bvh)
 
 
 @njit(cache=True, nogil=True)
