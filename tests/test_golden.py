@@ -1,0 +1,139 @@
+"""A tick computes what it computed before: features and hands of a written scene, against stored ones.
+
+A change of speed must leave this alone. A change of behaviour (sensors, solver) is stored anew, on purpose, with
+`python tests/test_golden.py`.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from manipnet.geometry import Array, quat_exp, quat_multiply
+from manipnet.network.bundle import Bundle, load_bundle
+from manipnet.network.features import features
+from manipnet.network.layout import INPUT, WINDOW_OFFSETS_S
+from manipnet.objects.shape import Shape, build_shape
+from manipnet.synthesis import HandScene, HandState, Synthesizer, windows_of
+from manipnet_tools.bench.shapes import gourd
+from tiny_bundle import write_tiny_bundle
+
+STORED = Path(__file__).with_name("golden.npz")
+TICKS = 6
+TICK_S = 0.1
+"""Longer than a real one, so that few ticks see a whole grasp."""
+FEATURES_WITHIN = 2e-5
+"""Metres, or the unit of the column: rays are traced in single precision."""
+POSES_WITHIN = 2e-5
+"""Radians and metres."""
+STRAY_RAYS = 3
+"""Rays that graze an edge may go either way on another machine."""
+
+
+def scenes_at(tick: int, shapes: list[Shape]) -> list[HandScene]:
+    """Both hands close on a turning gourd; a third, without another wrist, passes a scaled one far away."""
+    instants = tick * TICK_S + WINDOW_OFFSETS_S
+    thing = np.stack(
+        [np.concatenate([[0.3 + 0.05 * t, 1.0, -0.2], quat_exp(np.array([0.2, t, 0.1]))]) for t in instants]
+    )
+    right = _beside(instants, thing, side=1.0)
+    left = _beside(instants, thing, side=-1.0)
+    passing = right + np.array([0.0, 0.13, 0.05, 0.0, 0.0, 0.0, 0.0])
+    return [
+        HandScene("left", left, right, thing, shapes[0]),
+        HandScene("right", right, left, thing, shapes[0]),
+        HandScene("right", passing, None, thing, shapes[1], scale=1.3),
+    ]
+
+
+def _beside(instants: Array, thing: Array, side: float) -> Array:
+    """A wrist that comes within a grasp of the thing and leaves again, its palm (-z) toward it; left for side -1."""
+    facing = quat_exp(np.array([0.0, np.pi if side > 0.0 else 0.0, 0.0]))
+    poses = []
+    for t, pose in zip(instants, thing, strict=True):
+        gap = 0.055 + 0.15 * (t - 0.3) ** 2
+        offset = np.array([0.11, 0.01, -gap * side])
+        poses.append(
+            np.concatenate([pose[:3] + offset, quat_multiply(quat_exp(np.array([0.1 * t, 0.0, 0.0])), facing)])
+        )
+    return np.stack(poses)
+
+
+def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
+    """Every tick's features and hands, by name, `(TICKS, hands, …)`."""
+    shapes = [build_shape(gourd(triangles), cache) for triangles in (2000, 300)]
+    synthesizer = Synthesizer(bundle)
+    states = [synthesizer.rest_state() for _ in range(3)]
+    ticks: list[dict[str, list[np.ndarray]]] = []
+    for tick in range(TICKS):
+        scenes = scenes_at(tick, shapes)
+        rows = [_features(scene, state) for scene, state in zip(scenes, states, strict=True)]
+        steps = synthesizer.step(scenes, states)
+        states = [step.state for step in steps]
+        ticks.append(
+            {
+                "features": rows,
+                "angles": [state.angles for state in states],
+                "positions": [state.positions for state in states],
+                "raw_positions": [step.raw_positions for step in steps],
+                "distances": [step.distances for step in steps],
+            }
+        )
+    return {name: np.array([tick[name] for tick in ticks], dtype=np.float32) for name in ticks[0]}
+
+
+def _features(scene: HandScene, state: HandState) -> np.ndarray:
+    return features(scene.shape, windows_of([scene]), state.positions[None], state.rotations[None])[0]
+
+
+@pytest.fixture(scope="module")
+def computed(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    return compute(load_bundle(tiny_bundle), tmp_path_factory.mktemp("cache"))
+
+
+@pytest.fixture(scope="module")
+def stored() -> dict[str, np.ndarray]:
+    with np.load(STORED, allow_pickle=False) as data:
+        return dict(data)
+
+
+def test_features_are_what_they_were(computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
+    off = np.abs(computed["features"] - stored["features"]) > FEATURES_WITHIN
+    rays = off[..., INPUT["proximity"].columns]
+    assert rays.sum() <= STRAY_RAYS
+    assert off.sum() == rays.sum(), f"columns {np.unique(np.argwhere(off)[:, -1])[:20]} differ"
+
+
+def test_the_scene_has_everything_in_it(stored: dict[str, np.ndarray]) -> None:
+    rays = stored["features"][..., INPUT["proximity"].columns]
+    assert rays.min() < 0.0 < rays[rays > 0.0].min() < 0.01, "sensors inside, near and far"
+    assert stored["features"][..., INPUT["ambient"].columns].mean() > 0.01
+    assert stored["features"][..., INPUT["signed_distances"].columns].min() < 0.01
+    assert np.abs(stored["positions"] - stored["raw_positions"]).max() > 1e-3, "the solver has work to do"
+
+
+@pytest.mark.parametrize("name", ["angles", "positions", "raw_positions", "distances"])
+def test_hands_are_what_they_were(name: str, computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
+    np.testing.assert_allclose(computed[name], stored[name], rtol=0.0, atol=POSES_WITHIN)
+
+
+def test_a_hand_does_not_depend_on_its_batch(tiny_bundle: Path, tmp_path: Path) -> None:
+    shapes = [build_shape(gourd(triangles), tmp_path) for triangles in (2000, 300)]
+    synthesizer = Synthesizer(load_bundle(tiny_bundle))
+    scenes = [scene for tick in range(TICKS) for scene in scenes_at(tick, shapes)]
+    rest = synthesizer.rest_state()
+    together = synthesizer.step(scenes, [rest] * len(scenes))
+    for scene, step in zip(scenes, together, strict=True):
+        alone = synthesizer.step([scene], [rest])[0]
+        np.testing.assert_allclose(step.state.angles, alone.state.angles, rtol=0.0, atol=1e-6)
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        bundle = load_bundle(write_tiny_bundle(Path(folder) / "tiny"))
+        np.savez_compressed(STORED, **compute(bundle, Path(folder)))  # pyright: ignore[reportArgumentType]
+    print(f"stored {STORED}")
