@@ -56,7 +56,7 @@ class Publisher:
         assert self._pub is not None
         assert self._web is not None
         binary = encode_binary(message)
-        self._pub.send(TOPIC_MSGPACK + encode_msgpack(message))
+        self._pub.send(TOPIC_MSGPACK + encode_msgpack(message, checked=True))
         self._pub.send(TOPIC_BIN + binary)
         self._counters.add("messages_out", topic="msgpack")
         self._counters.add("messages_out", topic="bin")

@@ -11,9 +11,13 @@ from manipnet.streams.wire.checks import check, known_side, require_version
 from manipnet.streams.wire.schema import MAX_PAYLOAD_BYTES, Array, BodyPose, HandPose, HandsMessage, Latency
 
 
-def encode_msgpack(message: HandsMessage) -> bytes:
-    """The map of `docs/protocol.md`; raises `MessageError` rather than send a number that is not finite."""
-    check(message)
+def encode_msgpack(message: HandsMessage, checked: bool = False) -> bytes:
+    """The map of `docs/protocol.md`; raises `MessageError` rather than send a number that is not finite.
+
+    `checked` says that another encoder has just checked the same message.
+    """
+    if not checked:
+        check(message)
     payload = msgpack.packb(
         {
             "v": message.v,
