@@ -35,7 +35,6 @@ def test_it_loops_without_a_jump_in_time(tmp_path: Path) -> None:
     assert frames[20].bodies == frames[0].bodies
 
 
-@pytest.mark.skipif(not DEMO_FILE.exists(), reason="the performance is not made: python -m manipnet_tools.make_demo")
 def test_the_performance_ends_as_it_begins() -> None:
     frames = list(read_bodies(DEMO_FILE))
     names = {body.name for body in frames[0].bodies}
@@ -46,7 +45,6 @@ def test_the_performance_ends_as_it_begins() -> None:
         assert abs(np.dot(first.q, last.q)) > math.cos(math.radians(0.5))
 
 
-@pytest.mark.skipif(not DEMO_FILE.exists(), reason="the performance is not made: python -m manipnet_tools.make_demo")
 def test_the_server_performs(tiny_bundle: Path) -> None:
     with serving("--demo", "--model", str(tiny_bundle)) as server:
         subscriber = Subscriber(server.addresses["hands"])
