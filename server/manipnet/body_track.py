@@ -103,7 +103,7 @@ def sample(tracks: Sequence[BodyTrack], times_s: Array, until_s: float, forecast
     for row, track in zip(poses, tracks, strict=True):
         known = track.known(until_s)
         times, samples = track.times[:known], track.poses[:known]
-        _interpolate(times, samples, times_s, row)
+        _interpolate(times, samples, times_s, np.searchsorted(times, times_s, side="right"), row)
         if forecast is not None:
             beyond = times_s > times[-1] + TIME_TOLERANCE_S
             if beyond.any():
@@ -112,12 +112,14 @@ def sample(tracks: Sequence[BodyTrack], times_s: Array, until_s: float, forecast
 
 
 @njit(cache=True, nogil=True)
-def _interpolate(times, poses, at, out):
-    """Poses at the instants `at` between rising `times`, clamped at both ends, into `out`."""
+def _interpolate(times, poses, at, followers, out):
+    """Poses at the instants `at` between rising `times`, clamped at both ends, into `out`; `followers` are the
+    first times after each instant."""
     for i in range(len(at)):
-        after = np.searchsorted(times, at[i], side="right")
+        after = followers[i]
         if after == 0 or after == len(times):
-            out[i] = poses[min(after, len(times) - 1)]
+            for k in range(7):
+                out[i, k] = poses[min(after, len(times) - 1), k]
             continue
         before = after - 1
         fraction = (at[i] - times[before]) / (times[after] - times[before])

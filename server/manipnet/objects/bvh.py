@@ -60,7 +60,10 @@ def _order_triangles(corners):
         if last - first <= _LEAF_TRIANGLES or depth + 2 > _STACK:
             links[node, 0], links[node, 1] = first, last - first
             continue
-        axis = int(np.argmax(center_upper - center_lower))
+        axis = 0
+        for k in range(1, 3):
+            if center_upper[k] - center_lower[k] > center_upper[axis] - center_lower[axis]:
+                axis = k
         split = _partition(order, first, last, lower, upper, middle, axis, center_lower[axis], center_upper[axis])
         links[node, 0] = nodes
         spans[depth, 0], spans[depth, 1], spans[depth, 2] = nodes, first, split
