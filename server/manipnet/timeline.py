@@ -26,7 +26,7 @@ MAX_LOOK_AHEAD_S: Final = 0.5
 
 SILENCE_S: Final = 0.06
 """Without a frame for this long (or three usual intervals, if longer) our clock carries stream time on."""
-MAX_BACKLOG: Final = 60
+MAX_BACKLOG: Final = 120
 """Ticks due at once beyond which all but the newest are skipped."""
 SLEW: Final = 0.25
 """A changed look-ahead is reached by making ticks this much faster or slower, so none is missing."""
