@@ -1,6 +1,7 @@
 """Hands over WebSocket: every payload, the newest for slow readers, no other site's pages."""
 
 import socket
+from contextlib import ExitStack
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -63,13 +64,11 @@ def test_other_pages_may_not(publisher, origin):
 
 
 def test_a_crowd_is_bounded(publisher):
-    crowd = [connect(publisher.address) for _ in range(MAX_CLIENTS)]
-    for connection in crowd:
-        receive(publisher, connection, b"x")
-    with connect(publisher.address) as late, pytest.raises(ConnectionClosed, match="at most 32 clients"):
-        late.recv(timeout=10)
-    for connection in crowd:
-        connection.close()
+    with ExitStack() as crowd:
+        for _ in range(MAX_CLIENTS):
+            receive(publisher, crowd.enter_context(connect(publisher.address)), b"x")
+        with connect(publisher.address) as late, pytest.raises(ConnectionClosed, match="at most 32 clients"):
+            late.recv(timeout=10)
 
 
 def test_a_chatterbox_is_cut_off(publisher):

@@ -182,7 +182,7 @@ def test_multicast(connect, heard):
 def test_what_is_wrong_is_said_with_the_remedy(connect, options, info, says):
     with FakeMotive(info=info) as motive:
         client = connect(motive, **options)
-        motive.wait_for(0, 2)
+        motive.wait_for(0, 3)  # it asks again only after the answer before has been dealt with
         assert says in client.status()["problem"]
 
 
