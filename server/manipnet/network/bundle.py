@@ -35,6 +35,7 @@ class Bundle:
     meta: dict[str, Any]
     model_hash: str
     session: onnxruntime.InferenceSession
+    folder: Path
 
     def infer(self, rows: np.ndarray) -> np.ndarray:
         """Network outputs `(N, 220)` of feature rows `(N, 2356)` float32, both in SI units."""
@@ -65,11 +66,14 @@ def load_bundle(model: Path | str = DEFAULT_MODEL, providers: tuple[str, ...] = 
     model_hash = hashlib.sha256(content).hexdigest()
     if meta.get("model_sha256") != model_hash:
         raise BundleError(f"{path}: its hash is not the one in bundle.json; the bundle is damaged, copy it again")
-    session = _open_session(path, content, providers)
-    return Bundle(folder.name, *_read_pose(folder, meta), meta, model_hash, session)
+    session = open_session(path, content, providers)
+    return Bundle(folder.name, *_read_pose(folder, meta), meta, model_hash, session, folder)
 
 
-def _open_session(path: Path, content: bytes, providers: tuple[str, ...]) -> onnxruntime.InferenceSession:
+def open_session(
+    path: Path | str, content: bytes, providers: tuple[str, ...] = ("CPUExecutionProvider",)
+) -> onnxruntime.InferenceSession:
+    """A graph on one thread; raises `BundleError`, naming `path`, for one that is not of the feature layout."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3

@@ -17,7 +17,7 @@ def gourd(triangles: int) -> ClosedMesh:
     if triangles < FEWEST:
         raise ValueError(f"{triangles} triangles; the fewest are {FEWEST}")
     sectors = max(round(np.sqrt(triangles / 2.0)), 3)
-    rings = max(round(triangles / (2.0 * sectors)), 2)
+    rings = round(triangles / (2.0 * sectors)) + 1
     along = np.arange(1, rings) / rings
     radius = RADIUS_M * np.sin(np.pi * along) ** 0.6 * (1.0 - 0.25 * np.exp(-(((along - 0.65) / 0.12) ** 2)))
     turn = 2.0 * np.pi * np.arange(sectors) / sectors

@@ -1,0 +1,180 @@
+"""ManipNet's tick as one would first write it: trimesh for every query, PyTorch for the network, NumPy in between.
+
+It computes the same features as the product (`tests/tools/test_straightforward.py` compares them) from the same
+meshes, without fields, trees of our own, caches or compiled code, and is what `manipnet bench` calls the
+straightforward version. It stops at the targets of the inverse kinematics: the solver itself would only add to it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+import trimesh
+
+from manipnet.geometry import mirror_points, mirror_poses, quat_log, quat_multiply, quat_to_matrix
+from manipnet.hand.skeleton import PARENTS
+from manipnet.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
+from manipnet.network.layout import ENCODED, INPUT, INPUT_SIZE, OUTPUT, OUTPUT_SIZE, PRESENT, SENSED, WINDOW_STEP_S
+from manipnet.sensing.ambient import CELL_M, CELLS, CENTER_M
+from manipnet.synthesis import HandScene, HandState
+
+RANGE_M = 0.10
+NEAR_M = 0.028
+
+
+class Network(torch.nn.Module):
+    """The paper's network with random weights."""
+
+    mean: torch.Tensor
+    deviation: torch.Tensor
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.columns = list(ENCODED.values())
+        self.encoders = torch.nn.ModuleList(torch.nn.Linear(c.stop - c.start, width // 3) for c in self.columns)
+        self.layers = torch.nn.ModuleList(torch.nn.Linear(width, width) for _ in range(4))
+        self.decoder = torch.nn.Linear(width, OUTPUT_SIZE)
+        self.register_buffer("mean", torch.zeros(INPUT_SIZE))
+        self.register_buffer("deviation", torch.ones(INPUT_SIZE))
+
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        """Features `(N, 2356)` to outputs `(N, 220)`."""
+        x = (features - self.mean) / self.deviation
+        x = torch.cat([encode(x[:, c]) for encode, c in zip(self.encoders, self.columns, strict=True)], dim=1)
+        for first, second in (self.layers[:2], self.layers[2:]):
+            a = torch.relu(x)
+            c = torch.relu(first(a) + a)
+            x = second(c) + c + a
+        return self.decoder(x)
+
+
+@dataclass
+class View:
+    """One instant of a scene as a right hand's: maps from its wrist frame to the object's and back."""
+
+    wrist: np.ndarray
+    object: np.ndarray
+    mirrored: bool
+    scale: float
+
+    def to_object(self, points: np.ndarray) -> np.ndarray:
+        """Points `(N, 3)` in the wrist frame, in the object's own metres."""
+        return self.direction_to_object(points, self.wrist[:3] - self.object[:3]) / self.scale
+
+    def direction_to_object(self, directions: np.ndarray, shift: np.ndarray | float = 0.0) -> np.ndarray:
+        """Directions `(N, 3)` in the wrist frame, in the object's."""
+        world = directions @ quat_to_matrix(self.wrist[3:]).T + shift
+        local = world @ quat_to_matrix(self.object[3:])
+        return mirror_points(local) if self.mirrored else local
+
+    def direction_to_wrist(self, directions: np.ndarray) -> np.ndarray:
+        """Directions `(N, 3)` in the object's frame, in the wrist's."""
+        local = mirror_points(directions) if self.mirrored else directions
+        return local @ quat_to_matrix(self.object[3:]).T @ quat_to_matrix(self.wrist[3:])
+
+
+class Straightforward:
+    """Ticks of hands about one mesh."""
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray, width: int) -> None:
+        self.mesh = trimesh.Trimesh(vertices, faces, process=False)
+        self.network = Network(width).eval()
+
+    def tick(self, scenes: list[HandScene], states: list[HandState]) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Joint positions and their targets, `(22, 3)` each, of every hand."""
+        rows = np.stack([self.features(scene, state) for scene, state in zip(scenes, states, strict=True)])
+        with torch.no_grad():
+            outputs = self.network(torch.from_numpy(rows)).numpy()
+        return [self._targets(scene, output) for scene, output in zip(scenes, outputs, strict=True)]
+
+    def features(self, scene: HandScene, state: HandState) -> np.ndarray:
+        """The network's inputs `(2356,)` of one hand, float32."""
+        row = np.empty(INPUT_SIZE, np.float32)
+
+        def put(name: str, values: np.ndarray) -> None:
+            row[INPUT[name].columns] = values.reshape(-1)
+
+        put("joint_positions", state.positions)
+        put("joint_axes", _axes(np.concatenate([state.rotations, state.rotations[PARENTS[17:]]])))
+        self._put_trajectories(scene, put)
+        views = [_view(scene, t) for t in SENSED]
+        points, normals = _skin(state)
+        put("ambient", self._ambient(views[0]))
+        put("proximity", np.stack([self._proximity(view, points, normals) for view in views]))
+        sensed = [self._distances(view, state.positions) for view in views]
+        put("signed_distances", np.stack([np.minimum(distances, RANGE_M) for distances, _ in sensed]))
+        put("surface_normals", sensed[0][1])
+        return row
+
+    def _put_trajectories(self, scene: HandScene, put) -> None:
+        views = [_view(scene, t) for t in range(len(scene.wrist))]
+        wrist, obj = np.stack([v.wrist for v in views]), np.stack([v.object for v in views])
+        frame, origin = quat_to_matrix(wrist[PRESENT, 3:]), wrist[PRESENT, :3]
+        assert scene.other_wrist is not None
+        other = scene.other_wrist[:, :3]
+        other = mirror_points(other) if scene.side == "left" else other
+        center = self.mesh.center_mass * scene.scale
+        center = mirror_points(center) if scene.side == "left" else center
+        centers = obj[:, :3] + quat_to_matrix(obj[:, 3:]) @ center
+        turns = quat_log(quat_multiply(obj[1:, 3:], obj[:-1, 3:] * [-1.0, -1.0, -1.0, 1.0])) / WINDOW_STEP_S
+        put("wrist_positions", (wrist[:, :3] - origin) @ frame)
+        put("wrist_axes", _axes(frame.T @ quat_to_matrix(wrist[:, 3:])))
+        put("other_wrist_distances", np.linalg.norm(other - origin, axis=1))
+        put("object_centers", (centers - origin) @ frame)
+        put("object_angular_velocities", np.concatenate([turns[:1], turns]) @ frame)
+
+    def _ambient(self, view: View) -> np.ndarray:
+        steps = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
+        cells = CENTER_M + np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
+        points = view.to_object(cells)
+        closest, distance, _ = trimesh.proximity.closest_point(self.mesh, points)
+        offset = np.abs(view.direction_to_wrist(closest - points)) * view.scale
+        meets = np.all(offset <= 0.5 * CELL_M, axis=1)
+        outside = np.where(meets, 1.0 - distance * view.scale / CELL_M, 0.0)
+        return np.where(self.mesh.contains(points), 1.0, outside)
+
+    def _proximity(self, view: View, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        origins, directions = view.to_object(points), view.direction_to_object(normals)
+        inside = self.mesh.contains(origins)
+        directions = np.where(inside[:, None], -directions, directions)
+        hits, rays, _ = self.mesh.ray.intersects_location(origins, directions, multiple_hits=False)
+        distance = np.full(len(origins), np.inf)
+        distance[rays] = np.linalg.norm(hits - origins[rays], axis=1) * view.scale
+        return np.where(inside, -1.0, 1.0) * np.minimum(distance, RANGE_M)
+
+    def _distances(self, view: View, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        points = view.to_object(joints)
+        closest, distance, _ = trimesh.proximity.closest_point(self.mesh, points)
+        sign = np.where(self.mesh.contains(points), -1.0, 1.0)
+        outward = sign[:, None] * (points - closest) / np.maximum(distance, 1e-12)[:, None]
+        return sign * distance * view.scale, view.direction_to_wrist(outward)
+
+    def _targets(self, scene: HandScene, output: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        joints = output[OUTPUT["joint_positions"].columns].reshape(22, 3)
+        predicted = np.clip(output[OUTPUT["distances"].columns], 0.0, 0.035)
+        measured, outward = self._distances(_view(scene, PRESENT), joints)
+        final = np.where(measured < 0.0, 0.8 * predicted + 0.2 * measured, 0.2 * predicted + 0.8 * measured)
+        step = np.where(predicted <= NEAR_M, final - measured, 0.0)
+        return joints, joints + step[:, None] * outward
+
+
+def _view(scene: HandScene, t: int) -> View:
+    mirrored = scene.side == "left"
+    poses = (
+        (mirror_poses(scene.wrist[t]), mirror_poses(scene.object[t])) if mirrored else (scene.wrist[t], scene.object[t])
+    )
+    return View(*poses, mirrored, scene.scale)
+
+
+def _axes(rotations: np.ndarray) -> np.ndarray:
+    """The first two axes `(N, 2, 3)` of rotations `(N, 3, 3)`."""
+    return np.swapaxes(rotations[..., :2], -1, -2)
+
+
+def _skin(state: HandState) -> tuple[np.ndarray, np.ndarray]:
+    """Points and unit normals `(104, 3)` of the sensors on the posed hand."""
+    rotations, positions = state.rotations[SENSOR_BONES], state.positions[SENSOR_BONES]
+    points = positions + np.einsum("skij,skj->ski", rotations, SENSOR_POINTS)
+    normals = np.einsum("skij,skj->ski", rotations, SENSOR_NORMALS)
+    points, normals = (np.einsum("sk,ski->si", SENSOR_WEIGHTS, values) for values in (points, normals))
+    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)

@@ -1,0 +1,199 @@
+"""A real `manipnet-serve` process over its real sockets: when it is ready, what it holds, how late its hands come."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+import trimesh
+import zmq
+
+from manipnet.streams.bodies import BodyFrame
+from manipnet.streams.player import ZmqBodySender, play
+from manipnet.streams.wire import TOPIC_MSGPACK, HandsMessage, decode_msgpack
+from manipnet_tools.bench.machine import resident_mb
+from manipnet_tools.bench.performances import Performance, endless
+from manipnet_tools.bench.shapes import gourd
+
+START_S = 300.0
+"""A start on a busy machine that compiles everything."""
+SETTLE_S = 1.0
+"""Hands of the first seconds do not count: the window is not yet full."""
+QUIET_S = 1.0
+"""No hands for this long after the last body: they have all come."""
+TOLERANCE_S = 1e-6
+_PORTS = ("port", "input-port", "control-port", "osc-port", "page-port")
+
+
+class ServeError(RuntimeError):
+    """The server did not start, or fell silent; the text has its own words."""
+
+
+@dataclass(frozen=True)
+class Served:
+    """A server that is ready: its process, its addresses by what they carry, and how long it took."""
+
+    process: subprocess.Popen[str]
+    addresses: Mapping[str, str]
+    ready_s: float
+
+
+@contextmanager
+def serving(model: str, meshes: Mapping[str, Path], look_ahead_s: float, cache: Path | None = None) -> Iterator[Served]:
+    """A `manipnet-serve` on free ports, with its own `cache` folder if given. Raises `ServeError`."""
+    options = [f"--{port}=0" for port in _PORTS]
+    options += [word for name, path in meshes.items() for word in ("--mesh", f"{name}={path}")]
+    command = [sys.executable, "-m", "manipnet.cli", *options, "--model", model, "--look-ahead", str(look_ahead_s)]
+    environment = os.environ | ({"MANIPNET_CACHE": str(cache)} if cache else {})
+    with tempfile.TemporaryFile("w+") as errors:
+        start_s = time.monotonic()
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True, env=environment)
+        watchdog = threading.Timer(START_S, process.kill)
+        watchdog.start()
+        try:
+            assert process.stdout is not None
+            words = process.stdout.readline().split()
+            ready_s = time.monotonic() - start_s
+            watchdog.cancel()
+            if words[:1] != ["ready"]:
+                errors.seek(0)
+                raise ServeError(f"the server did not get ready: {errors.read().strip() or 'it said nothing'}")
+            reader = threading.Thread(target=_drain, args=(process.stdout,), daemon=True)
+            reader.start()
+            yield Served(process, dict(zip(words[1::2], words[2::2], strict=True)), ready_s)
+        finally:
+            watchdog.cancel()
+            process.send_signal(signal.SIGTERM)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(10.0)
+            process.kill()
+            process.wait()
+            if process.stdout is not None:
+                process.stdout.close()
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Seconds to `ready` with nothing cached and with everything cached, and MB resident after each."""
+
+    cold_s: float
+    warm_s: float
+    cold_mb: float | None
+    warm_mb: float | None
+
+
+def starts(model: str, triangles: int = 5000) -> Starts:
+    """Start a server on one prop twice, the first time with an empty cache."""
+    folder = Path(tempfile.mkdtemp(prefix="manipnet-bench-"))
+    try:
+        mesh = gourd(triangles)
+        path = folder / "gourd.ply"
+        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(path)
+        seconds, sizes = [], []
+        for _ in range(2):
+            with serving(model, {"gourd": path}, 0.5, folder / "cache") as server:
+                seconds.append(server.ready_s)
+                sizes.append(resident_mb(server.process.pid))
+        return Starts(*seconds, *sizes)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@dataclass(frozen=True)
+class EndToEnd:
+    """Seconds from the last packet a tick needed to its hands received `(n,)`, and between publications `(n - 1,)`."""
+
+    look_ahead_s: float
+    latency_s: np.ndarray
+    interval_s: np.ndarray
+    missing: int
+    resident_mb: float | None
+
+
+class TimedSender(ZmqBodySender):
+    """Notes when each frame was handed to the socket, on the monotonic clock."""
+
+    def __init__(self, host: str, port: int) -> None:
+        super().__init__(host, port)
+        self.sent: list[tuple[float, float]] = []
+
+    def send(self, frame: BodyFrame) -> None:
+        self.sent.append((frame.t_s, time.monotonic()))
+        super().send(frame)
+
+
+def end_to_end(model: str, performance: Performance, look_ahead_s: float, seconds: float) -> EndToEnd:
+    """Play a performance to a server in real time and receive its hands on the same machine."""
+    with serving(model, performance.meshes, look_ahead_s) as server:
+        received, sent = _perform(server, performance, SETTLE_S + seconds + look_ahead_s)
+        size = resident_mb(server.process.pid)
+    messages = [(decode_msgpack(payload), at_s) for payload, at_s in received]
+    counted = [(m, at_s) for m, at_s in messages if m.t_capture >= SETTLE_S]
+    if len(counted) < 2:
+        raise ServeError(f"only {len(messages)} hands messages came in {seconds:g} s")
+    sequence = [message.seq for message, _ in counted]
+    return EndToEnd(
+        look_ahead_s,
+        _latencies(counted, sent, look_ahead_s),
+        np.diff([message.t_publish for message, _ in counted]),
+        sequence[-1] - sequence[0] + 1 - len(sequence),
+        size,
+    )
+
+
+def _perform(
+    server: Served, performance: Performance, seconds: float
+) -> tuple[list[tuple[bytes, float]], list[tuple[float, float]]]:
+    host, _, port = server.addresses["bodies"].removeprefix("tcp://").rpartition(":")
+    frames = takewhile(lambda frame: frame.t_s <= seconds, endless(performance))
+    received: list[tuple[bytes, float]] = []
+    with zmq.Context() as context, context.socket(zmq.SUB) as hands:
+        hands.setsockopt(zmq.RCVHWM, 0)
+        hands.setsockopt(zmq.RCVTIMEO, int(1e3 * (QUIET_S + SETTLE_S)))
+        hands.subscribe(TOPIC_MSGPACK)
+        hands.connect(server.addresses["hands"])
+        sender = TimedSender(host, int(port))
+        thread = threading.Thread(target=_play, args=(frames, sender))
+        thread.start()
+        try:
+            # hands go on when bodies stop, held: the last frame ends the performance
+            while thread.is_alive():
+                with suppress(zmq.Again):
+                    received.append((hands.recv()[len(TOPIC_MSGPACK) :], time.monotonic()))
+        finally:
+            thread.join()
+            sender.close()
+    return received, sender.sent
+
+
+def _play(frames: Iterable[BodyFrame], sender: TimedSender) -> None:
+    play(frames, sender)
+
+
+def _latencies(
+    messages: Iterable[tuple[HandsMessage, float]], sent: list[tuple[float, float]], look_ahead_s: float
+) -> np.ndarray:
+    """From the first frame at or after what a tick looks ahead to, to its message; frames are at rising times."""
+    times_s, handed_s = np.array(sent).T
+    latencies = []
+    for message, at_s in messages:
+        needed = int(np.searchsorted(times_s, message.t_capture + look_ahead_s - TOLERANCE_S))
+        if needed < len(times_s):
+            latencies.append(at_s - handed_s[needed])
+    return np.array(latencies)
+
+
+def _drain(lines: Iterable[str]) -> None:
+    with suppress(ValueError):  # closed under us at the end
+        for _ in lines:
+            pass

@@ -1,0 +1,149 @@
+"""The figures of a run as tables a person reads, and as verdicts on what was asked of them."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from manipnet_tools.bench.machine import Machine
+from manipnet_tools.bench.rigs import STAGES
+
+Figures = dict[str, Any]
+_SHOWN = ("sense", "infer", "ik")
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is asked: a figure's place in the results, its bound, and whether it must reach it instead."""
+
+    what: str
+    place: tuple[str, ...]
+    bound: float
+    unit: str = "x"
+    at_least: bool = False
+
+
+TARGETS = (
+    Target("tick, chosen model: p50", ("tick", "total", "p50"), 0.5),
+    Target("tick, chosen model: p99", ("tick", "total", "p99"), 1.0),
+    Target("tick at 5k triangles: p50", ("triangles", "5000", "total", "p50"), 0.5),
+    Target("tick at 5k triangles: p99", ("triangles", "5000", "total", "p99"), 1.0),
+    Target("tick, full width in 8 bits: p50", ("models", "8 bits", "total", "p50"), 0.6),
+    Target("tick, full width in 8 bits: p99", ("models", "8 bits", "total", "p99"), 1.2),
+    Target("sensors: p50", ("tick", "sense", "p50"), 0.2),
+    Target("inverse kinematics: p50", ("tick", "ik", "p50"), 0.1),
+    Target("200k triangles over 5k", ("ratios", "200k triangles"), 1.3),
+    Target("8 actors over 1", ("ratios", "8 actors"), 3.0),
+    Target("straightforward version over ours", ("straightforward", "times"), 20.0, at_least=True),
+    Target("end to end beyond look-ahead 0.5 s: p99", ("live", "0.5", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
+    Target("end to end beyond look-ahead 0.1 s: p99", ("live", "0.1", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
+    Target("published interval: p99", ("live", "0.5", "interval", "p99_ms"), 18.5, "ms"),
+    Target("hands missing", ("live", "0.5", "missing"), 0.0, ""),
+    Target("ready, warm cache", ("start", "warm_s"), 3.0, "s"),
+    Target("ready, empty cache", ("start", "cold_s"), 12.0, "s"),
+    Target("resident memory, one actor", ("live", "0.5", "resident_mb"), 350.0, "MB"),
+)
+
+
+def with_ratios(figures: Figures) -> Figures:
+    """The figures with those that compare two of them."""
+    ratios = {}
+    for name, section, one, other in (
+        ("200k triangles", "triangles", "200000", "5000"),
+        ("8 actors", "actors", "8", "1"),
+    ):
+        a, b = (_find(figures, (section, which, "total", "p50_ms")) for which in (one, other))
+        if a is not None and b is not None:
+            ratios[name] = a / b
+    return figures | {"ratios": ratios}
+
+
+def verdicts(figures: Figures) -> list[tuple[Target, float, bool]]:
+    """Every target that was measured, its figure, and whether it is met."""
+    found = [(target, _find(figures, target.place)) for target in TARGETS]
+    return [
+        (target, value, value >= target.bound if target.at_least else value <= target.bound)
+        for target, value in found
+        if value is not None
+    ]
+
+
+def _find(figures: Figures, place: Iterable[str]) -> float | None:
+    value: Any = figures
+    for key in place:
+        if not isinstance(value, dict) or key not in value:
+            return None
+        value = value[key]
+    return value
+
+
+def lines(figures: Figures, machine: Machine, about: str) -> Iterator[str]:
+    """The report. Milliseconds are this machine's; ratios are to the reference's p50 of the same section."""
+    yield f"{machine}"
+    yield f"{about}; reference: the 1536 wide network alone, single precision, two hands, one thread"
+    if "total" in figures.get("tick", {}):
+        yield from _stages(figures["tick"])
+    for section, title in (("models", "full width"), ("triangles", "triangles"), ("actors", "actors")):
+        yield from _totals(title, figures.get(section, {}))
+    yield from _straightforward(figures.get("straightforward", {}))
+    yield from _process(figures)
+    yield ""
+    for target, value, met in verdicts(figures):
+        sign = ">=" if target.at_least else "<="
+        yield f"{'met   ' if met else 'MISSED'}  {target.what:42} {value:9.3g} {sign} {target.bound:.3g} {target.unit}"
+
+
+def _stages(tick: Figures) -> Iterator[str]:
+    yield f"\none actor, {tick['triangles']} triangles, {tick['ticks']} ticks in turns with the reference"
+    yield f"{'':12} {'p50 ms':>8} {'p99':>8} {'p99.9':>8} {'max':>8}   {'p50 / ref':>9} {'p99 / ref':>9}"
+    for name in (*STAGES[:-1], "total", "encode", "reference"):
+        row = tick[name]
+        ratios = f"   {row['p50']:9.3f} {row['p99']:9.3f}" if "p50" in row else ""
+        yield f"{name:12} " + " ".join(f"{row[k]:8.3f}" for k in ("p50_ms", "p99_ms", "p99.9_ms", "max_ms")) + ratios
+    memory = tick["memory"]
+    yield (
+        f"allocated per tick: {memory['held_p50'] / 1e3:.0f} kB held at once (at most {memory['held_max'] / 1e3:.0f}), "
+        f"{memory['kept_per_tick'] / 1e3:.1f} kB kept"
+    )
+
+
+def _totals(title: str, section: Figures) -> Iterator[str]:
+    if not section:
+        return
+    if "skipped" in section:
+        yield f"\n{title}: {section['skipped']}"
+        return
+    yield f"\n{title:12} {'p50 ms':>8} {'p99':>8}   {'p50 / ref':>9} {'p99 / ref':>9}   " + "  ".join(_SHOWN)
+    for name, figures in section.items():
+        if isinstance(figures, dict):
+            total, stages = figures["total"], " ".join(f"{figures[s]['p50']:6.3f}" for s in _SHOWN)
+            yield (
+                f"{name:12} {total['p50_ms']:8.3f} {total['p99_ms']:8.3f}   "
+                f"{total['p50']:9.3f} {total['p99']:9.3f}   {stages}"
+            )
+    if "weights" in section:
+        yield f"weights: {section['weights']}; joints of 8 bits at most {section['8_bits_apart_mm']:.2f} mm apart"
+
+
+def _straightforward(section: Figures) -> Iterator[str]:
+    if "skipped" in section:
+        yield f"\nstraightforward version: {section['skipped']}"
+    elif section:
+        theirs, ours = section["theirs"]["p50_ms"], section["ours"]["p50_ms"]
+        yield f"\nstraightforward version: {theirs:.0f} ms a tick, ours {ours:.3f} ms: {section['times']:.0f} times"
+
+
+def _process(figures: Figures) -> Iterator[str]:
+    if start := figures.get("start"):
+        yield ""
+        for name, cache in (("cold", "an empty"), ("warm", "a full")):
+            size = start[f"{name}_mb"]
+            yield f"ready after {start[f'{name}_s']:.1f} s with {cache} cache" + (f", {size:.0f} MB" if size else "")
+    for look_ahead, row in figures.get("live", {}).items():
+        latency, interval = row["latency"], row["interval"]
+        size = f", {row['resident_mb']:.0f} MB resident" if row["resident_mb"] else ""
+        yield (
+            f"look-ahead {look_ahead} s, {row['hands']} hands over sockets: last packet needed to hands received p50 "
+            f"{latency['p50_ms']:.2f}, p99 {latency['p99_ms']:.2f}, max {latency['max_ms']:.2f} ms; interval p50 "
+            f"{interval['p50_ms']:.2f}, p99 {interval['p99_ms']:.2f}, max {interval['max_ms']:.2f} ms; "
+            f"{row['missing']} missing{size}"
+        )

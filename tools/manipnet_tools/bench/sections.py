@@ -1,0 +1,179 @@
+"""What `manipnet bench` measures, section by section: each adds its figures to a plain dictionary."""
+
+import importlib.util
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from manipnet.network.bundle import Bundle
+from manipnet.network.features import features
+from manipnet.objects.shape import build_shape
+from manipnet.synthesis import windows_of
+from manipnet_tools.bench.live import end_to_end, starts
+from manipnet_tools.bench.models import FullWidth, apart_m, quantised
+from manipnet_tools.bench.performances import Performance
+from manipnet_tools.bench.reference import WIDTH
+from manipnet_tools.bench.rigs import STAGES, Race, Rig, memory, race
+from manipnet_tools.bench.shapes import gourd
+
+TRIANGLES = (12, 100, 1000, 5000, 20_000, 80_000, 200_000)
+ACTORS = (1, 2, 4, 8, 16)
+LOOK_AHEADS_S = (0.5, 0.1)
+STRAIGHTFORWARD = Path(__file__).parents[3] / "benchmarks" / "straightforward.py"
+"""Not part of an installed package: only a checkout has it."""
+
+Figures = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What is measured, and with what."""
+
+    bundle: Bundle
+    performance: Performance
+    full: FullWidth
+    reference: Callable[[], object]
+    seconds: float
+    """Of timing in all; building, starting and tracing come on top."""
+
+
+def percentiles(seconds: np.ndarray) -> Figures:
+    """p50, p99, p99.9 and the maximum in milliseconds."""
+    p50, p99, p999 = np.percentile(1e3 * seconds, [50.0, 99.0, 99.9])
+    return {"p50_ms": float(p50), "p99_ms": float(p99), "p99.9_ms": float(p999), "max_ms": float(1e3 * seconds.max())}
+
+
+def _raced(result: Race, name: str) -> Figures:
+    """Percentiles of a rig's whole ticks and of its stages, and both over the reference's p50."""
+    p50 = float(np.median(1e3 * result.reference))
+    figures = {stage: percentiles(result.stages[name][stage]) for stage in STAGES}
+    figures["total"] = percentiles(result.total(name))
+    for row in figures.values():
+        row |= {"p50": row["p50_ms"] / p50, "p99": row["p99_ms"] / p50}
+    return figures | {"reference": percentiles(result.reference), "ticks": len(result.reference)}
+
+
+def tick(bench: Bench) -> Figures:
+    """The tick of the chosen model, stage by stage, and what it asks of the allocator."""
+    rig = Rig(bench.bundle, bench.performance)
+    figures = _raced(race({"tick": rig}, bench.reference, 0.25 * bench.seconds), "tick")
+    return figures | {"memory": asdict(memory(rig)), "triangles": bench.performance.triangles}
+
+
+def models(bench: Bench) -> Figures:
+    """The same tick with the paper's width, in single precision and in 8 bits."""
+    try:
+        small = quantised(bench.full)
+    except ModuleNotFoundError as error:
+        return {"skipped": f"{error.name} is not installed: it makes the 8-bit weights"}
+    rigs = {"single": Rig(bench.full.bundle, bench.performance), "8 bits": Rig(small, bench.performance)}
+    result = race(rigs, bench.reference, 0.15 * bench.seconds)
+    rows = np.concatenate([_asked_features(rigs["single"]) for _ in range(30) if rigs["single"].tick()])
+    return {
+        "weights": bench.full.origin,
+        "single": _raced(result, "single"),
+        "8 bits": _raced(result, "8 bits"),
+        "8_bits_apart_mm": 1e3 * apart_m(bench.full.bundle, small, rows),
+    }
+
+
+def _asked_features(rig: Rig) -> np.ndarray:
+    scenes, states = rig.synthesizer.asked
+    rows = [
+        features(scene.shape, windows_of([scene]), state.positions[None], state.rotations[None])
+        for scene, state in zip(scenes, states, strict=True)
+    ]
+    return np.concatenate(rows)
+
+
+def triangles(bench: Bench) -> Figures:
+    """The same tick with every prop a gourd of 12 … 200,000 triangles."""
+    shapes = {count: build_shape(gourd(count)) for count in TRIANGLES}
+    rigs = {str(count): Rig(bench.bundle, bench.performance.with_shape(shape)) for count, shape in shapes.items()}
+    result = race(rigs, bench.reference, 0.15 * bench.seconds)
+    return {name: _raced(result, name) | {"triangles": len(shapes[int(name)].mesh.faces)} for name in rigs}
+
+
+def actors(bench: Bench) -> Figures:
+    """1 … 16 actors, both hands of each, as one batch."""
+    rigs = {str(count): Rig(bench.bundle, bench.performance, count) for count in ACTORS}
+    result = race(rigs, bench.reference, 0.2 * bench.seconds)
+    return {name: _raced(result, name) for name in rigs}
+
+
+def straightforward(bench: Bench) -> Figures:
+    """A tick of the version one would first write, full width, on the same hands; ours beside it."""
+    if not STRAIGHTFORWARD.is_file():
+        return {"skipped": "benchmarks/straightforward.py is only in a checkout"}
+    try:
+        module = _load(STRAIGHTFORWARD)
+    except ModuleNotFoundError as error:
+        return {"skipped": f"{error.name} is not installed"}
+    rig, theirs, ours = Rig(bench.bundle, bench.performance), [], []
+    slow: dict[int, Any] = {}
+    end_s = time.perf_counter() + 0.1 * bench.seconds
+    while time.perf_counter() < end_s or len(theirs) < 3:
+        ours += [sum(spent for stage, spent in rig.tick().items() if stage != "encode") for _ in range(60)]
+        scenes, states = rig.synthesizer.asked
+        if len({id(scene.shape) for scene in scenes}) != 1 or len(scenes) != 2:
+            continue  # it is about one mesh and two hands
+        mesh = scenes[0].shape.mesh
+        version = slow.setdefault(id(mesh), module.Straightforward(mesh.vertices, mesh.faces, WIDTH))
+        version.tick(scenes, states)
+        start_s = time.perf_counter()
+        version.tick(scenes, states)
+        theirs.append(time.perf_counter() - start_s)
+    times = float(np.median(theirs) / np.median(ours))
+    return {"theirs": percentiles(np.array(theirs)), "ours": percentiles(np.array(ours)), "times": times}
+
+
+def _load(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("straightforward", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def start(bench: Bench) -> Figures:
+    """A real server's way to `ready`, with an empty cache and a full one."""
+    return asdict(starts(_model(bench)))
+
+
+def live(bench: Bench) -> Figures:
+    """A real server over its real sockets, at two look-aheads."""
+    figures: Figures = {}
+    for look_ahead_s in LOOK_AHEADS_S:
+        seconds = 0.15 * bench.seconds
+        result = end_to_end(_model(bench), bench.performance, look_ahead_s, seconds)
+        figures[str(look_ahead_s)] = {
+            "latency": percentiles(result.latency_s),
+            "interval": percentiles(result.interval_s),
+            "hands": len(result.latency_s),
+            "missing": result.missing,
+            "resident_mb": result.resident_mb,
+            "seconds": seconds,
+        }
+    return figures
+
+
+def _model(bench: Bench) -> str:
+    return str(bench.bundle.folder)
+
+
+SECTIONS: dict[str, Callable[[Bench], Figures]] = {
+    "tick": tick,
+    "models": models,
+    "triangles": triangles,
+    "actors": actors,
+    "straightforward": straightforward,
+    "start": start,
+    "live": live,
+}
