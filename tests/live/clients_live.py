@@ -1,8 +1,9 @@
 """A minute with every engine-free client: losses, age, memory, restarts, a client that stalls.
 
-`python tests/live/clients_live.py [--seconds 60] [--serve "manipnet-serve --demo"] [--only csharp]`. Without `--serve`
-a small publisher of hands stands in for the server. With it, the given command is started on free ports, killed and
-started again on the same ones. Prints a line of figures per client and fails on a limit.
+`python tests/live/clients_live.py [--seconds 60] [--only csharp] [--serve "manipnet-serve --mesh mug1=mug1.obj"
+[--take TAKE]]`. Without `--serve` a small publisher of hands stands in for the server. With it, the given command is
+started on free ports, a take is replayed into it if one is given, and it is killed and started again on the same ports.
+Prints a line of figures per client and fails on a limit.
 
 `transit` is what a frame took from the server's publishing to the client's reader; JavaScript has another clock, so
 there `age`, the time since the newest frame arrived, stands in, which a frame's length, 17 ms, is part of.
@@ -16,9 +17,11 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -30,23 +33,41 @@ TRANSIT_LIMIT_MS, AGE_LIMIT_MS, BACK_LIMIT_S = 20.0, 37.0, 2.0
 STALL_S = 5.0
 
 
+@dataclass(frozen=True)
+class Stage:
+    """What to read from: a server's command, or None for the stand-in, and a take to replay into it."""
+
+    serve: str | None
+    take: str | None
+
+    @contextmanager
+    def server(self, ports: tuple[str, str] = ("0", "0")) -> Iterator[tuple[subprocess.Popen, str, str]]:
+        """A running server: its process, tcp:// and ws:// address."""
+        if self.serve is None:
+            words = [sys.executable, str(ROOT / "tests" / "clients" / "publisher.py")]
+            words += ["--port", ports[0], "--websocket-port", ports[1], "--session", str(time.monotonic_ns())]
+        else:
+            others = ["--input-port", "0", "--control-port", "0", "--osc-port", "0"]
+            words = [*shlex.split(self.serve), "--port", ports[0], "--page-port", ports[1], *others]
+        with ExitStack() as started:
+            process = started.enter_context(_running(words))
+            assert process.stdout is not None
+            line = next((line for line in process.stdout if line.startswith("ready")), None)
+            if line is None:
+                raise SystemExit(f"{shlex.join(words)} ended without being ready")
+            threading.Thread(target=process.stdout.read, daemon=True).start()  # it goes on telling
+            tcp = re.findall(r"tcp://\S+", line)[0]
+            if self.take is not None:
+                bodies = dict(re.findall(r"(\w+) (tcp://\S+)", line))["bodies"]
+                started.enter_context(_running(["manipnet", "replay", self.take, "--to", bodies, "--loop"]))
+            yield process, tcp, re.findall(r"ws://\S+", line)[0]
+
+
 @contextmanager
-def server(command: str | None, ports: tuple[str, str] = ("0", "0")) -> Iterator[tuple[subprocess.Popen, str, str]]:
-    """A running server: its process, tcp:// and ws:// address."""
-    if command is None:
-        words = [sys.executable, str(ROOT / "tests" / "clients" / "publisher.py")]
-        words += ["--port", ports[0], "--websocket-port", ports[1], "--session", str(time.monotonic_ns())]
-    else:
-        others = ["--input-port", "0", "--control-port", "0", "--osc-port", "0"]
-        words = [*shlex.split(command), "--port", ports[0], "--page-port", ports[1], *others]
+def _running(words: list[str]) -> Iterator[subprocess.Popen]:
     process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
-        assert process.stdout is not None
-        line = next(line for line in process.stdout if line.startswith("ready"))
-        tcp, websocket = re.search(r"tcp://\S+", line), re.search(r"ws://\S+", line)
-        assert tcp
-        assert websocket
-        yield process, tcp[0], websocket[0]
+        yield process
     finally:
         process.kill()
         process.wait()
@@ -86,19 +107,20 @@ def _p99_ms(seconds: list[float]) -> float:
     return round(1000 * sorted(seconds)[int(0.99 * len(seconds))], 1)
 
 
-def restart(client: LiveClient, command: str | None, old: subprocess.Popen, tcp: str, websocket: str) -> dict:
-    """Kill the server and start it again, twice: how soon the client is back, and what the second time leaked."""
+def restart(client: LiveClient, stage: Stage, old: subprocess.Popen, tcp: str, websocket: str) -> dict:
+    """Kill the server and start it again, twice: how soon the client is connected, and what the second time leaked."""
     ports = (tcp.rpartition(":")[2], websocket.rpartition(":")[2])
     back_s, before, after = 0.0, {}, {}
     with ExitStack() as servers:
         for _ in range(2):
-            before, session = footprint(client.process.pid), client.ask()["session"]
+            before, known = footprint(client.process.pid), client.ask()
             old.kill()
             old.wait()
-            old, _, _ = servers.enter_context(server(command, ports))
+            old, _, _ = servers.enter_context(stage.server(ports))
             ready = time.monotonic()
-            client.ask_until(lambda f, session=session: f["session"] != session)
+            client.ask_until(lambda f, known=known: f["connections"] > known["connections"])
             back_s = max(back_s, time.monotonic() - ready)
+            client.ask_until(lambda f, known=known: f["session"] != known["session"])
             after = footprint(client.process.pid)
     return {"back_s": round(back_s, 2), "leaked": {key: after[key] - before[key] for key in before}}
 
@@ -120,13 +142,13 @@ def stall(client: LiveClient, tcp: str) -> dict:
     return {"missed": newest.seq - held, "backlog_shown": len(backlog), "resumed_s": round(resumed_s, 2)}
 
 
-def check(name: str, command: list[str], serve: str | None, seconds: float) -> bool:
+def check(name: str, command: list[str], stage: Stage, seconds: float) -> bool:
     """All of it with one client; prints the figures and tells whether every limit is met."""
-    with server(serve) as (process, tcp, websocket):
+    with stage.server() as (process, tcp, websocket):
         client = LiveClient.start(command, websocket if name == "javascript" else tcp)
         try:
             figures = (
-                read_steadily(client, seconds) | stall(client, tcp) | restart(client, serve, process, tcp, websocket)
+                read_steadily(client, seconds) | stall(client, tcp) | restart(client, stage, process, tcp, websocket)
             )
             closed = client.close()
         finally:
@@ -149,11 +171,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--serve", help="command that starts a server; ports are appended")
+    parser.add_argument("--take", help="what to replay into it, at its own rate, over and over")
     parser.add_argument("--only", choices=NAMES)
     options = parser.parse_args()
+    stage = Stage(options.serve, options.take)
     names = [options.only] if options.only else NAMES
     with tempfile.TemporaryDirectory() as folder:
-        met = [check(name, build(name, Path(folder)), options.serve, options.seconds) for name in names]
+        met = [check(name, build(name, Path(folder)), stage, options.seconds) for name in names]
     return 0 if all(met) else 1
 
 
