@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from manipnet.demo.performance import DEMO_OBJECTS
 from manipnet.objects.field import field_distance
+from manipnet.objects.library import load_library_mesh
 from manipnet.objects.mesh import closed_mesh
 from manipnet.objects.rays import TreeRays
-from manipnet.objects.shape import build_shape, load_shape
+from manipnet.objects.shape import PREBUILT_FOLDER, build_shape, cache_name, load_shape
 
 RADIUS = 0.04
 HALF = np.array([0.03, 0.04, 0.05])
@@ -123,3 +125,12 @@ def test_independent_values(manipnet_data, take):
     np.testing.assert_allclose(shape.trace(*rays), checks[f"{take}/ray_distance"].reshape(-1), atol=1e-5)
     np.testing.assert_allclose(shape.center_of_mass, checks[f"{take}/center_of_mass"], atol=1e-6)
     np.testing.assert_allclose(shape.volume_m3, checks[f"{take}/volume"], rtol=1e-6)
+
+
+def test_the_demos_shapes_are_built_ahead(tmp_path):
+    for name in DEMO_OBJECTS:
+        mesh = load_library_mesh(name)
+        assert (PREBUILT_FOLDER / cache_name(mesh)).is_file(), "run python -m manipnet_tools.make_prebuilt"
+        shipped = build_shape(mesh, tmp_path)
+        np.testing.assert_allclose(np.abs(shipped.signed_distance(mesh.vertices[::50])[0]), 0.0, atol=1e-6)
+        assert not list(tmp_path.iterdir()), "a shipped shape needs no building"

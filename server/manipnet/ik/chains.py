@@ -18,7 +18,7 @@ CAPSULE_STARTS, CAPSULE_ENDS = CAPSULE_JOINTS[:, 0].copy(), CAPSULE_JOINTS[:, 1]
 CAPSULE_RADII = CAPSULE_RADII_M.copy()
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def dof_moves(dof, bone):
     """Whether the angle turns `bone` (both of one finger)."""
     return DOF_JOINTS[dof] <= bone

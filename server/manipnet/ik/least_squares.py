@@ -40,7 +40,7 @@ CONTACT_MARGIN_M = 0.006
 _MAX_STEP_RAD = 0.2
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def _jacobian_column(axis, origin, x, y, z):
     rx, ry, rz = x - origin[0], y - origin[1], z - origin[2]
     return axis[1] * rz - axis[2] * ry, axis[2] * rx - axis[0] * rz, axis[0] * ry - axis[1] * rx

@@ -10,11 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import njit, prange
+from manipnet.kernels import njit
 
 _BINS = 12
 _LEAF_TRIANGLES = 3
+_BINNED_LEVELS = 48
+"""Below this depth nodes are halved: what is left there is degenerate, and the tree must stay flat enough."""
+_MOST_LEVELS = _BINNED_LEVELS + 24
 _STACK = 96
+"""Room for a walk down any tree, one node waiting per level."""
 
 
 class Bvh(NamedTuple):
@@ -30,88 +34,78 @@ class Bvh(NamedTuple):
     """`(F, 7, 3)` pseudo-normals: face, edges 01 12 20, corners 0 1 2."""
 
 
-@njit(cache=True, nogil=True)
-def _order_triangles(corners):
-    """Binned surface-area-heuristic build. Returns boxes, links and the order of the triangles in the leaves."""
-    count = len(corners)
-    lower, upper, middle = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
-    for f in range(count):
-        for k in range(3):
-            lower[f, k] = min(corners[f, 0, k], corners[f, 1, k], corners[f, 2, k])
-            upper[f, k] = max(corners[f, 0, k], corners[f, 1, k], corners[f, 2, k])
-            middle[f, k] = 0.5 * (lower[f, k] + upper[f, k])
-    order = np.arange(count)
-    boxes, links = np.empty((2 * count, 6)), np.zeros((2 * count, 2), np.int32)
-    spans = np.empty((_STACK, 3), np.int64)
-    spans[0, 0], spans[0, 1], spans[0, 2] = 0, 0, count
-    depth, nodes = 1, 1
-    while depth > 0:
-        depth -= 1
-        node, first, last = spans[depth, 0], spans[depth, 1], spans[depth, 2]
-        boxes[node, :3], boxes[node, 3:] = np.inf, -np.inf
-        center_lower, center_upper = np.full(3, np.inf), np.full(3, -np.inf)
-        for i in range(first, last):
-            f = order[i]
-            for k in range(3):
-                boxes[node, k] = min(boxes[node, k], lower[f, k])
-                boxes[node, 3 + k] = max(boxes[node, 3 + k], upper[f, k])
-                center_lower[k] = min(center_lower[k], middle[f, k])
-                center_upper[k] = max(center_upper[k], middle[f, k])
-        if last - first <= _LEAF_TRIANGLES or depth + 2 > _STACK:
-            links[node, 0], links[node, 1] = first, last - first
-            continue
-        axis = 0
-        for k in range(1, 3):
-            if center_upper[k] - center_lower[k] > center_upper[axis] - center_lower[axis]:
-                axis = k
-        split = _partition(order, first, last, lower, upper, middle, axis, center_lower[axis], center_upper[axis])
-        links[node, 0] = nodes
-        spans[depth, 0], spans[depth, 1], spans[depth, 2] = nodes, first, split
-        spans[depth + 1, 0], spans[depth + 1, 1], spans[depth + 1, 2] = nodes + 1, split, last
-        depth, nodes = depth + 2, nodes + 2
-    return boxes[:nodes].copy(), links[:nodes].copy(), order
+def _order_triangles(corners: Array) -> tuple[Array, np.ndarray, np.ndarray]:
+    """Binned surface-area-heuristic build, level by level. Returns boxes, links and the triangles in leaf order."""
+    lower, upper = corners.min(axis=1), corners.max(axis=1)
+    order = np.arange(len(corners))
+    firsts, counts = np.zeros(1, np.int64), np.array([len(corners)])
+    boxes, links, nodes = [], [], 1
+    for level in range(_MOST_LEVELS):
+        boxes.append(_boxes(lower, upper, order, firsts, counts))
+        inner = counts > _LEAF_TRIANGLES
+        links.append(np.stack([firsts, counts], axis=1))
+        links[-1][inner, 0] = nodes + 2 * np.arange(inner.sum())
+        links[-1][inner, 1] = 0
+        if not inner.any():
+            break
+        firsts, counts = firsts[inner], counts[inner]
+        nodes += 2 * len(firsts)
+        lefts = _partition(lower, upper, order, firsts, counts, by_middle=level >= _BINNED_LEVELS)
+        firsts = np.stack([firsts, firsts + lefts], axis=1).ravel()
+        counts = np.stack([lefts, counts - lefts], axis=1).ravel()
+    return np.concatenate(boxes), np.concatenate(links).astype(np.int32), order
 
 
-@njit(cache=True, nogil=True)
-def _partition(order, first, last, lower, upper, middle, axis, start, stop):
-    """Reorder `order[first:last]` about the cheapest of the bin borders; returns where the right side begins."""
-    if stop - start < 1e-12:
-        return (first + last) // 2
-    scale = _BINS * (1.0 - 1e-9) / (stop - start)
-    counts = np.zeros(_BINS, np.int64)
-    low, high = np.full((_BINS, 3), np.inf), np.full((_BINS, 3), -np.inf)
-    for i in range(first, last):
-        f = order[i]
-        b = int((middle[f, axis] - start) * scale)
-        counts[b] += 1
-        for k in range(3):
-            low[b, k], high[b, k] = min(low[b, k], lower[f, k]), max(high[b, k], upper[f, k])
-    best, border = np.inf, -1
-    for cut in range(1, _BINS):
-        cost, empty = 0.0, False
-        for side in range(2):
-            span_low, span_high, total = np.full(3, np.inf), np.full(3, -np.inf), 0
-            for b in range(0 if side == 0 else cut, cut if side == 0 else _BINS):
-                total += counts[b]
-                for k in range(3):
-                    span_low[k], span_high[k] = min(span_low[k], low[b, k]), max(span_high[k], high[b, k])
-            if total == 0:
-                empty = True
-                break
-            x, y, z = span_high[0] - span_low[0], span_high[1] - span_low[1], span_high[2] - span_low[2]
-            cost += total * (x * y + y * z + z * x)
-        if not empty and cost < best:
-            best, border = cost, cut
-    if border < 0:
-        return (first + last) // 2
-    i, j = first, last - 1
-    while i <= j:
-        if int((middle[order[i], axis] - start) * scale) < border:
-            i += 1
-        else:
-            order[i], order[j] = order[j], order[i]
-            j -= 1
-    return i
+def _members(order: np.ndarray, firsts: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the triangles of some nodes are in `order`, node after node, and where each node begins among them."""
+    starts = np.cumsum(counts) - counts
+    return np.repeat(firsts - starts, counts) + np.arange(counts.sum()), starts
+
+
+def _boxes(lower: Array, upper: Array, order: np.ndarray, firsts: np.ndarray, counts: np.ndarray) -> Array:
+    at, starts = _members(order, firsts, counts)
+    low, high = np.minimum.reduceat(lower[order[at]], starts), np.maximum.reduceat(upper[order[at]], starts)
+    return np.concatenate([low, high], axis=1)
+
+
+def _partition(
+    lower: Array, upper: Array, order: np.ndarray, firsts: np.ndarray, counts: np.ndarray, by_middle: bool
+) -> np.ndarray:
+    """Sort every node's triangles along its longest axis, by bins; returns how many go to the left, at least one.
+
+    The border is the cheapest one between bins, or in the middle where there is none.
+    """
+    at, starts = _members(order, firsts, counts)
+    triangles, node = order[at], np.repeat(np.arange(len(counts)), counts)
+    middle = 0.5 * (lower + upper)[triangles]
+    start, stop = np.minimum.reduceat(middle, starts), np.maximum.reduceat(middle, starts)
+    axis = np.argmax(stop - start, axis=1)
+    each = np.arange(len(counts))
+    start, extent = start[each, axis], (stop - start)[each, axis]
+    scale = _BINS * (1.0 - 1e-9) / np.maximum(extent, 1e-12)
+    bins = node * _BINS + ((middle[np.arange(len(at)), axis[node]] - start[node]) * scale[node]).astype(np.int64)
+    by_bin = np.argsort(bins, kind="stable")
+    order[at] = triangles = triangles[by_bin]
+    sizes = np.bincount(bins, minlength=len(counts) * _BINS)
+    used = np.flatnonzero(sizes)
+    low, high = np.full((len(sizes), 3), np.inf), np.full((len(sizes), 3), -np.inf)
+    begins = (np.cumsum(sizes) - sizes)[used]
+    low[used] = np.minimum.reduceat(lower[triangles], begins)
+    high[used] = np.maximum.reduceat(upper[triangles], begins)
+    low, high, sizes = (values.reshape(len(counts), _BINS, *values.shape[1:]) for values in (low, high, sizes))
+    left, right = _costs(low, high, sizes), _costs(*(values[:, ::-1] for values in (low, high, sizes)))[:, ::-1]
+    cost = left[:, :-1] + right[:, 1:]
+    best = np.argmin(cost, axis=1)
+    lefts = np.cumsum(sizes, axis=1)[each, best]
+    return np.where(np.isinf(cost[each, best]) | by_middle, counts // 2, lefts)
+
+
+def _costs(low: Array, high: Array, sizes: np.ndarray) -> Array:
+    """Half the surface of the first 1, 2, … bins times their triangles `(nodes, bins)`; infinite where empty."""
+    spans = np.maximum.accumulate(high, axis=1) - np.minimum.accumulate(low, axis=1)
+    totals = np.cumsum(sizes, axis=1)
+    x, y, z = np.moveaxis(np.where(totals[..., None] > 0, spans, 0.0), -1, 0)
+    return np.where(totals > 0, totals * (x * y + y * z + z * x), np.inf)
 
 
 def build_bvh(vertices: Array, faces: np.ndarray) -> Bvh:
@@ -140,7 +134,7 @@ def pseudo_normals(vertices: Array, faces: np.ndarray) -> Array:
     return normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-30)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def _closest_on_triangle(px, py, pz, t, f):
     """Closest point of triangle `t[f]` of `t (F, 3, 3)`: coordinates and region (0 face, 1-3 edges, 4-6 corners).
 
@@ -186,7 +180,7 @@ def _closest_on_triangle(px, py, pz, t, f):
     return ax + abx * v + acx * w, ay + aby * v + acy * w, az + abz * v + acz * w, 0
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def _box_distance_squared(boxes, node, px, py, pz):
     x = max(boxes[node, 0] - px, 0.0, px - boxes[node, 3])
     y = max(boxes[node, 1] - py, 0.0, py - boxes[node, 4])
@@ -235,15 +229,6 @@ def closest_point(bvh, px, py, pz, seed):
     )
     distance = np.sqrt(best)
     return (-distance if side < 0.0 else distance), bx, by, bz, triangle, region
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def closest_points_parallel(bvh, points, distance, closest, triangle):
-    """Unseeded closest points of many `points (N, 3)` on all cores, for building fields and for tools."""
-    for i in prange(len(points)):
-        d, x, y, z, t, _ = closest_point(bvh, points[i, 0], points[i, 1], points[i, 2], np.int32(-1))
-        distance[i], triangle[i] = d, t
-        closest[i, 0], closest[i, 1], closest[i, 2] = x, y, z
 
 
 @njit(cache=True, nogil=True)

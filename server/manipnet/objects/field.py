@@ -5,13 +5,15 @@ field alone answers where the surface is several cells away (trilinear interpola
 of a millimetre) and names a near triangle where it is not.
 """
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.kernels import njit
-from manipnet.objects.bvh import Bvh, closest_point, closest_points_parallel
+from manipnet.objects.bvh import Bvh, closest_point
 
 MARGIN_M = 0.12
 """How far the grid reaches beyond the mesh: the sensors saturate at 0.10 m."""
@@ -39,66 +41,56 @@ def build_field(bvh: Bvh) -> Field:
     lower, upper = bvh.boxes[0, :3] - MARGIN_M, bvh.boxes[0, 3:] + MARGIN_M
     cell = float(np.max(upper - lower)) / (RESOLUTION - 1)
     shape = np.ceil((upper - lower) / cell).astype(np.int64) + 1
-    axes = [lower[k] + cell * np.arange(shape[k]) for k in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    distance, closest = np.empty(len(points)), np.empty_like(points)
-    triangle = np.empty(len(points), np.int32)
-    closest_points_parallel(bvh, points, distance, closest, triangle)
-    inside = _inside_by_columns(bvh.corners, lower, cell, shape[0], shape[1], shape[2])
-    distance = np.where(inside, -1.0, 1.0) * np.abs(distance).reshape(shape)
-    return Field(lower, cell, distance.astype(np.float32), triangle.reshape(shape))
+    distance, triangle = np.empty(shape, np.float32), np.empty(shape, np.int32)
+    workers = os.cpu_count() or 1
+    slabs = np.array_split(np.arange(shape[0]), 4 * workers)
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(lambda slab: _sample(bvh, lower, cell, slab, distance, triangle), slabs))
+    inside = _inside_by_columns(bvh.corners, lower, cell, shape)
+    np.negative(distance, out=distance, where=inside)
+    return Field(lower, cell, distance, triangle)
 
 
 @njit(cache=True, nogil=True)
-def _column_crossings(corners, lower, cell, nx, ny, starts, heights, signs):
-    """Where triangles cross the grid's vertical (z) lines. With empty `heights` only counts into `starts`."""
-    filling = len(heights) > 0
+def _sample(bvh, lower, cell, slab, distance, triangle):
+    """Unsigned distances and nearest triangles of the grid points with first index in `slab`."""
+    near = -1
+    for i in slab:
+        for j in range(distance.shape[1]):
+            for k in range(distance.shape[2]):
+                x, y, z = lower[0] + cell * i, lower[1] + cell * j, lower[2] + cell * k
+                # the triangle nearest to the last point is a good guess for this one
+                d, _, _, _, near, _ = closest_point(bvh, x, y, z, near)
+                distance[i, j, k], triangle[i, j, k] = abs(d), near
+
+
+def _inside_by_columns(corners: Array, lower: Array, cell: float, shape: np.ndarray) -> np.ndarray:
+    """Winding number above one half at every grid point, by counting oriented crossings of vertical lines above it."""
     # a tiny irrational shift keeps lines off shared edges and corners
-    x0, y0 = lower[0] + 1.3e-7 * np.sqrt(2.0), lower[1] + 1.1e-7 * np.sqrt(3.0)
-    for f in range(len(corners)):
-        a, b, c = corners[f, 0], corners[f, 1], corners[f, 2]
-        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        if area == 0.0:
-            continue
-        first_x = max(int(np.ceil((min(a[0], b[0], c[0]) - x0) / cell)), 0)
-        last_x = min(int(np.floor((max(a[0], b[0], c[0]) - x0) / cell)), nx - 1)
-        first_y = max(int(np.ceil((min(a[1], b[1], c[1]) - y0) / cell)), 0)
-        last_y = min(int(np.floor((max(a[1], b[1], c[1]) - y0) / cell)), ny - 1)
-        for i in range(first_x, last_x + 1):
-            for j in range(first_y, last_y + 1):
-                x, y = x0 + i * cell, y0 + j * cell
-                u = ((b[0] - x) * (c[1] - y) - (b[1] - y) * (c[0] - x)) / area
-                v = ((c[0] - x) * (a[1] - y) - (c[1] - y) * (a[0] - x)) / area
-                w = 1.0 - u - v
-                if u < 0.0 or v < 0.0 or w < 0.0:
-                    continue
-                column = i * ny + j
-                if filling:
-                    heights[starts[column]] = u * a[2] + v * b[2] + w * c[2]
-                    signs[starts[column]] = 1 if area > 0.0 else -1
-                starts[column] += 1
+    origin = lower[:2] + 1e-7 * np.sqrt([2.2, 3.3])
+    flat = (corners[:, :, :2] - origin) / cell
+    first = np.maximum(np.ceil(flat.min(axis=1)).astype(np.int64), 0)
+    sizes = np.maximum(np.minimum(np.floor(flat.max(axis=1)).astype(np.int64), shape[:2] - 1) - first + 1, 0)
+    counts = sizes.prod(axis=1)
+    # every grid line in every triangle's bounding rectangle
+    face = np.repeat(np.arange(len(corners)), counts)
+    nth = np.arange(len(face)) - np.repeat(np.cumsum(counts) - counts, counts)
+    i, j = first[face, 0] + nth // sizes[face, 1], first[face, 1] + nth % sizes[face, 1]
+    a, b, c = (flat[face, corner] - np.stack([i, j], axis=1) for corner in range(3))
+    weights = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
+    area = weights.sum(axis=1)
+    hit = (area != 0.0) & np.all(weights * np.sign(area)[:, None] >= 0.0, axis=1)
+    face, weights, area = face[hit], weights[hit], area[hit]
+    heights = np.sum(weights * corners[face, :, 2], axis=1) / area
+    below = np.clip(np.ceil((heights - lower[2]) / cell).astype(np.int64), 0, shape[2])
+    # a crossing counts for every point below it
+    steps = np.zeros((shape[0], shape[1], shape[2] + 1), np.int32)
+    np.add.at(steps, (i[hit], j[hit], below), np.sign(area).astype(np.int32))
+    return np.cumsum(steps[:, :, ::-1], axis=2)[:, :, -2::-1] > 0
 
 
-@njit(cache=True, nogil=True)
-def _inside_by_columns(corners, lower, cell, nx, ny, nz):
-    """Winding number above one half at every grid point, by counting oriented crossings from above."""
-    counts = np.zeros(nx * ny, np.int64)
-    _column_crossings(corners, lower, cell, nx, ny, counts, np.empty(0), np.empty(0, np.int8))
-    ends = np.cumsum(counts)
-    starts = ends - counts
-    heights, signs = np.empty(max(ends[-1], 1)), np.empty(max(ends[-1], 1), np.int8)
-    _column_crossings(corners, lower, cell, nx, ny, starts.copy(), heights, signs)
-    inside = np.zeros((nx, ny, nz), np.bool_)
-    for column in range(nx * ny):
-        if counts[column] == 0:
-            continue
-        for k in range(nz):
-            z, winding = lower[2] + k * cell, 0
-            for crossing in range(starts[column], ends[column]):
-                if heights[crossing] > z:
-                    winding += signs[crossing]
-            inside[column // ny, column % ny, k] = winding > 0
-    return inside
+def _cross(a: Array, b: Array) -> Array:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 @njit(cache=True, nogil=True)

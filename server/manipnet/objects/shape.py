@@ -19,6 +19,8 @@ from manipnet.objects.mesh import ClosedMesh, load_mesh
 from manipnet.objects.rays import RayScene, ray_scene
 
 _CACHE_VERSION = f"1-{RESOLUTION}"
+PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
+"""Shapes of the demo's objects, so that a first start need not compile what builds them."""
 _log = logging.getLogger(__name__)
 
 
@@ -88,8 +90,8 @@ def load_shape(path: Path | str, unit: str = "m", scale: float = 1.0, name: str 
 def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
     folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
-    path = folder / f"{mesh.content_hash[:32]}-{_CACHE_VERSION}.npz"
-    parts = _read_cache(path)
+    path = folder / cache_name(mesh)
+    parts = _read_cache(path) or _read_cache(PREBUILT_FOLDER / path.name)
     if parts is None:
         bvh = build_bvh(mesh.vertices, mesh.faces)
         parts = bvh, build_field(bvh)
@@ -97,6 +99,11 @@ def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     mass = mass_properties(mesh.vertices[mesh.faces])
     inertia = np.asarray(mass["inertia"]) / mass["mass"]
     return Shape(mesh, *parts, np.asarray(mass["center_mass"]), float(mass["volume"]), inertia)
+
+
+def cache_name(mesh: ClosedMesh) -> str:
+    """File name of a mesh's shape in any cache folder."""
+    return f"{mesh.content_hash[:32]}-{_CACHE_VERSION}.npz"
 
 
 def _read_cache(path: Path) -> tuple[Bvh, Field] | None:

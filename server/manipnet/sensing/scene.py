@@ -8,7 +8,7 @@ SENSOR_RANGE_M = 0.10
 """Where proximity and signed distances saturate (paper, section 5.2)."""
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def quat_to_matrix_into(q, out):
     """Rotation matrix of the unit quaternion `q (4,)` xyzw, into `out (3, 3)`."""
     x, y, z, w = q[0], q[1], q[2], q[3]
@@ -36,7 +36,7 @@ def object_from_wrist(wrist, obj, mirrored, rotation, translation):
             rotation[i, j] = flip * (o[0, i] * w[0, j] + o[1, i] * w[1, j] + o[2, i] * w[2, j])
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def map_point(rotation, translation, scale, x, y, z):
     """A point in wrist coordinates to the object's own coordinates."""
     return (
@@ -46,7 +46,7 @@ def map_point(rotation, translation, scale, x, y, z):
     )
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True)
 def map_direction_back(rotation, x, y, z):
     """A direction in the object's coordinates to wrist coordinates."""
     return (

@@ -1,0 +1,28 @@
+"""Builds the shapes of the demo's objects ahead: `python -m manipnet_tools.make_prebuilt` after a change of either."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from manipnet.demo.performance import DEMO_OBJECTS
+from manipnet.objects.library import load_library_mesh
+from manipnet.objects.shape import PREBUILT_FOLDER, build_shape, cache_name
+
+
+def main() -> None:
+    """Replace the files in the package."""
+    PREBUILT_FOLDER.mkdir(exist_ok=True)
+    for old in PREBUILT_FOLDER.glob("*.npz"):
+        old.unlink()
+    for name in DEMO_OBJECTS:
+        mesh = load_library_mesh(name)
+        with tempfile.TemporaryDirectory() as folder:
+            shape = build_shape(mesh, Path(folder))
+        path = PREBUILT_FOLDER / cache_name(mesh)
+        np.savez_compressed(path, allow_pickle=False, **shape.bvh._asdict(), **shape.field._asdict())
+        print(f"{path}: {name}, {path.stat().st_size} bytes")
+
+
+if __name__ == "__main__":
+    main()
