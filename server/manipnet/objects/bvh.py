@@ -92,8 +92,9 @@ def _partition(
     begins = (np.cumsum(sizes) - sizes)[used]
     low[used] = np.minimum.reduceat(lower[triangles], begins)
     high[used] = np.maximum.reduceat(upper[triangles], begins)
-    low, high, sizes = (values.reshape(len(counts), _BINS, *values.shape[1:]) for values in (low, high, sizes))
-    left, right = _costs(low, high, sizes), _costs(*(values[:, ::-1] for values in (low, high, sizes)))[:, ::-1]
+    low, high = low.reshape(len(counts), _BINS, 3), high.reshape(len(counts), _BINS, 3)
+    sizes = sizes.reshape(len(counts), _BINS)
+    left, right = _costs(low, high, sizes), _costs(low[:, ::-1], high[:, ::-1], sizes[:, ::-1])[:, ::-1]
     cost = left[:, :-1] + right[:, 1:]
     best = np.argmin(cost, axis=1)
     lefts = np.cumsum(sizes, axis=1)[each, best]
