@@ -42,7 +42,7 @@ def joints_of(side: str, wrist: Array, angles: Array, scale: float = 1.0) -> Arr
     positions, quats = positions * scale, matrix_to_quat(matrices)
     if side == "left":
         positions, quats = mirror_points(positions), mirror_quats(quats)
-    return openxr_joints(side, wrist, positions, quats)
+    return openxr_joints([side], wrist[None], positions[None], quats[None])[0]
 
 
 def axes(joints: Array, *names: str) -> tuple[Array, Array]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from manipnet.actor import Actor, ShownHand
-from manipnet.geometry import Array, matrix_to_quat, mirror_points, mirror_quats, quat_conjugate, quat_multiply
+from manipnet.geometry import matrix_to_quat, mirror_points, mirror_quats, quat_conjugate, quat_multiply
 from manipnet.hand.joint_sets import openxr_joints
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.hand.skeleton import BONE_COUNT, PARENTS
@@ -13,6 +13,8 @@ from manipnet.presence import HOLD_AFTER_S
 from manipnet.streams.wire import BodyPose, HandPose, HandsMessage, Latency
 from manipnet.synthesis import Side
 from manipnet.timeline import Tick
+
+_PARENTS = PARENTS[1:BONE_COUNT]
 
 
 def hands_message(
@@ -45,26 +47,24 @@ def hand_poses(hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, Hand
     """What is shown of each hand, with its joints in the world; `scale` is the hand's size over the model's."""
     if not hands:
         return {}
-    positions, rotations = forward_kinematics(np.stack([hand.shown.angles for hand in hands.values()]))
-    quats = matrix_to_quat(rotations)
+    sides, shown = list(hands), [hand.shown for hand in hands.values()]
+    positions, rotations = forward_kinematics(np.stack([hand.angles for hand in shown]))
+    positions, quats = positions * scale, matrix_to_quat(rotations)
+    if "left" in hands:
+        left = sides.index("left")
+        positions[left], quats[left] = mirror_points(positions[left]), mirror_quats(quats[left])
+    local = quats.copy()
+    local[:, 1:] = quat_multiply(quat_conjugate(quats[:, _PARENTS]), quats[:, 1:])
+    joints = openxr_joints(sides, np.stack([hand.wrist for hand in shown]), positions, quats)
     return {
-        side: _hand_pose(side, hand, positions[i] * scale, quats[i], scale)
+        side: HandPose(
+            state=hand.shown.state,
+            object=hand.prop,
+            scale=scale,
+            angles=hand.shown.angles,
+            rotations=local[i],
+            wrist=hand.shown.wrist,
+            joints=joints[i],
+        )
         for i, (side, hand) in enumerate(hands.items())
     }
-
-
-def _hand_pose(side: Side, hand: ShownHand, positions: Array, quats: Array, scale: float) -> HandPose:
-    """`positions (22, 3)` and `quats (17, 4)` are a right hand's, in its wrist frame."""
-    if side == "left":
-        positions, quats = mirror_points(positions), mirror_quats(quats)
-    local = np.concatenate([quats[:1], quat_multiply(quat_conjugate(quats[PARENTS[1:BONE_COUNT]]), quats[1:])])
-    shown = hand.shown
-    return HandPose(
-        state=shown.state,
-        object=hand.prop,
-        scale=scale,
-        angles=shown.angles,
-        rotations=local,
-        wrist=shown.wrist,
-        joints=openxr_joints(side, shown.wrist, positions, quats),
-    )

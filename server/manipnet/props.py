@@ -1,5 +1,6 @@
 """The props of one actor, and which of them a hand is about."""
 
+import math
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.config import ObjectConfig
-from manipnet.geometry import Array, invert, mirror_points, transform
+from manipnet.geometry import Array, mirror_points, transform
 from manipnet.objects.library import library_names, load_library_mesh
 from manipnet.objects.shape import Shape, build_shape, load_shape
 from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S
@@ -84,12 +85,35 @@ def choose_prop(
     tracked = [prop for prop in props if prop.name in bodies and bodies[prop.name].age_s <= HOLD_AFTER_S]
     if len(tracked) < 2:
         return tracked[0] if tracked else None
-    palm = transform(T_world_wrist, PALM_M if side == "right" else mirror_points(PALM_M))
-    distances = [palm_distance(palm, prop, bodies[prop.name].pose) - HYSTERESIS_M * (prop is held) for prop in tracked]
-    return tracked[int(np.argmin(distances))]
+    palm = transform(T_world_wrist, PALM_M if side == "right" else mirror_points(PALM_M)).tolist()
+    nearest, least_m = tracked[0], math.inf
+    # no exact distance for a prop that is farther than the nearest one even if it reaches all the way to the palm
+    for bound_m, _, prop in sorted((_least_distance(palm, prop, bodies), i, prop) for i, prop in enumerate(tracked)):
+        advantage_m = HYSTERESIS_M if prop is held else 0.0
+        if bound_m - advantage_m < least_m:
+            distance_m = palm_distance(palm, prop, bodies[prop.name].pose) - advantage_m
+            if distance_m < least_m:
+                nearest, least_m = prop, distance_m
+    return nearest
 
 
-def palm_distance(p_palm: Array, prop: Prop, T_world_object: Array) -> float:
+def _least_distance(p_palm: Sequence[float], prop: Prop, bodies: Mapping[str, BodyAtTick]) -> float:
+    return math.dist(p_palm, bodies[prop.name].pose[:3].tolist()) - prop.shape.reach_m * prop.scale
+
+
+def palm_distance(p_palm: Sequence[float], prop: Prop, T_world_object: Array) -> float:
     """Signed distance of a world point to a prop's surface, metres."""
-    p_object = transform(invert(T_world_object), p_palm) / prop.scale
-    return float(prop.shape.signed_distance(p_object[None])[0][0]) * prop.scale
+    p_object = np.array([_carried_back(T_world_object.tolist(), p_palm)]) / prop.scale
+    return float(prop.shape.signed_distance(p_object)[0][0]) * prop.scale
+
+
+def _carried_back(T_a_b: Sequence[float], p_a: Sequence[float]) -> tuple[float, float, float]:
+    """A point of frame a in frame b; NumPy would take ten times as long for one point."""
+    px, py, pz, x, y, z, w = T_a_b
+    dx, dy, dz = p_a[0] - px, p_a[1] - py, p_a[2] - pz
+    tx, ty, tz = 2.0 * (dy * z - dz * y), 2.0 * (dz * x - dx * z), 2.0 * (dx * y - dy * x)
+    return (
+        dx + w * tx + ty * z - tz * y,
+        dy + w * ty + tz * x - tx * z,
+        dz + w * tz + tx * y - ty * x,
+    )

@@ -6,6 +6,7 @@ Sources: OpenXR specification, XR_EXT_hand_tracking, "Conventions of hand joints
 VMC's (Unity's) finger bones are in `manipnet.streams.vmc`: their thumb names sit one joint higher than these.
 """
 
+from collections.abc import Sequence
 from typing import Final, Literal
 
 import numpy as np
@@ -13,6 +14,8 @@ import numpy as np
 from manipnet.geometry import Array, matrix_to_quat, mirror_quats, quat_multiply, transform
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.hand.skeleton import BONE_COUNT, DOF_AXES, DOF_COUNT, DOF_JOINTS, DOF_NAMES, FINGER_JOINTS, PARENTS
+
+Side = Literal["left", "right"]
 
 _FINGERS = ("index", "middle", "ring", "little")
 
@@ -51,20 +54,19 @@ _JOINTS = np.array([0, 0, *FINGER_JOINTS[0][1:], *(j for chain in FINGER_JOINTS[
 _BONES = np.where(_JOINTS < BONE_COUNT, _JOINTS, PARENTS[_JOINTS])
 
 
-def openxr_joints(side: Literal["left", "right"], T_world_wrist: Array, positions: Array, rotations: Array) -> Array:
-    """World poses `(26, 7)` of one hand's OpenXR joints, xyz and xyzw.
+def openxr_joints(sides: Sequence[Side], T_world_wrist: Array, positions: Array, rotations: Array) -> Array:
+    """World poses `(N, 26, 7)` of the OpenXR joints of N hands, xyz and xyzw.
 
-    `T_world_wrist (7,)`; joint `positions (22, 3)` in metres and bone `rotations (17, 4)` in that hand's own wrist
-    frame, so mirrored already for a left hand. Tips are turned like the bone before them. Finger metacarpals, which
-    our hand lacks, and the palm are turned like the wrist; the palm lies in the middle of the middle metacarpal.
+    `T_world_wrist (N, 7)`; joint `positions (N, 22, 3)` in metres and bone `rotations (N, 17, 4)` in each hand's own
+    wrist frame, so mirrored already for a left hand. Tips are turned like the bone before them. Finger metacarpals,
+    which our hand lacks, and the palm are turned like the wrist; the palm lies in the middle of the middle metacarpal.
     """
-    joints = np.empty((26, 7))
-    joints[:, :3] = positions[_JOINTS]
-    joints[_METACARPALS, :3] = positions[0] + _METACARPAL_BASE * (positions[_KNUCKLES] - positions[0])
-    joints[0, :3] = joints[[11, 12], :3].mean(axis=0)
-    offsets = _OFFSETS if side == "right" else mirror_quats(_OFFSETS)
-    turned = quat_multiply(rotations[_BONES], offsets)
-    return np.concatenate([transform(T_world_wrist, joints[:, :3]), quat_multiply(T_world_wrist[3:], turned)], axis=1)
+    wrist = T_world_wrist[:, None]
+    joints = positions[:, _JOINTS]
+    joints[:, _METACARPALS] = positions[:, :1] + _METACARPAL_BASE * (positions[:, _KNUCKLES] - positions[:, :1])
+    joints[:, 0] = 0.5 * (joints[:, 11] + joints[:, 12])
+    turned = quat_multiply(rotations[:, _BONES], np.stack([_OFFSETS[side] for side in sides]))
+    return np.concatenate([transform(wrist, joints), quat_multiply(wrist[..., 3:], turned)], axis=-1)
 
 
 def _flat_hand_offsets() -> Array:
@@ -91,4 +93,5 @@ def _frame(along: Array, hinge: Array) -> Array:
     return columns / np.linalg.norm(columns, axis=0)
 
 
-_OFFSETS: Final = _flat_hand_offsets()
+_RIGHT = _flat_hand_offsets()
+_OFFSETS: Final[dict[Side, Array]] = {"right": _RIGHT, "left": mirror_quats(_RIGHT)}

@@ -52,6 +52,11 @@ class Shape:
         """Lower and upper corner, `(2, 3)`."""
         return self.bvh.boxes[0].reshape(2, 3)
 
+    @cached_property
+    def reach_m(self) -> float:
+        """No part of it is farther than this from the origin of its frame, metres at scale 1."""
+        return float(np.linalg.norm(np.abs(self.bounds).max(axis=0)))
+
     @property
     def exact_within_m(self) -> float:
         """Distance in the object's own metres below which the sensors refine the field exactly."""
