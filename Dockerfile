@@ -12,7 +12,7 @@ RUN pip install --no-cache-dir .
 USER manipnet
 WORKDIR /home/manipnet
 ENV PYTHONUNBUFFERED=1
-EXPOSE 5555 5556 5557 39540/udp 8080
+EXPOSE 5555 5556 5557 39540/udp 8080 8081
 
 # inside a container the loopback is the container's own, so the server listens on all of its addresses; publish only
 # the ports you need and only to networks you trust

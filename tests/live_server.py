@@ -22,7 +22,7 @@ from manipnet.streams.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, decode
 PATIENCE_S = 60.0
 START_S = 300.0
 """The first start after a change compiles everything, perhaps on a busy machine."""
-FREE_PORTS = [f"--{name}=0" for name in ("port", "input-port", "control-port", "osc-port", "page-port")]
+FREE_PORTS = [f"--{name}=0" for name in ("port", "input-port", "control-port", "osc-port", "page-port", "web-port")]
 
 
 class LiveServer:

@@ -5,7 +5,7 @@ import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { JOINT_PARENTS, ManipNetClient } from "./manipnet.js";
 
 const SIDES = { left: 0x6fb1ff, right: 0xffa46f };
-const server = new URLSearchParams(location.search).get("server") ?? "ws://127.0.0.1:8080";
+const server = new URLSearchParams(location.search).get("server") ?? "ws://127.0.0.1:8081";
 const client = new ManipNetClient(server);
 const status = document.getElementById("status");
 

@@ -19,6 +19,7 @@ DEFAULTS = {
     "control_port": 5557,
     "osc_port": 39540,
     "page_port": 8080,
+    "web_port": 8081,
     "model": "manipnet-small",
     "look_ahead": 0.5,
 }
@@ -60,6 +61,7 @@ def build_parser() -> argparse.ArgumentParser:
     _option(where, "control_port", int, "PORT", "requests, ZeroMQ REP")
     _option(where, "osc_port", int, "PORT", "bodies in, OSC over UDP")
     _option(where, "page_port", int, "PORT", "live page, HTTP and WebSocket")
+    _option(where, "web_port", int, "PORT", "hands out to browser clients, WebSocket")
     where.add_argument("--metrics-port", type=int, metavar="PORT", help="Prometheus metrics, HTTP (default: none)")
     where.add_argument("--keys", type=Path, metavar="FOLDER", help="let in only clients with keys: see `manipnet keys`")
     where.add_argument("--allow", action="append", metavar="NETWORK", help="who may send OSC; repeatable")

@@ -65,6 +65,7 @@ class ServerConfig:
     control_port: int = 5557
     osc_port: int = 39540
     page_port: int = 8080
+    web_port: int = 8081
     metrics_port: int | None = None
     natnet: tuple[str, int] | None = None
     """Motive to connect to; the three below are about it."""
@@ -128,7 +129,7 @@ def is_loopback(host: str) -> bool:
 
 def check(config: ServerConfig) -> None:
     """Raise `ConfigError` unless a server can be started from this."""
-    for option in ("port", "input_port", "control_port", "osc_port", "page_port", "metrics_port"):
+    for option in ("port", "input_port", "control_port", "osc_port", "page_port", "web_port", "metrics_port"):
         port = getattr(config, option)
         if port is not None and not 0 <= port < 65536:
             raise ConfigError(f"--{option.replace('_', '-')} is {port}; allowed are 0 (any free one) … 65535")

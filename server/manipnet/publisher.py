@@ -28,7 +28,7 @@ class Publisher:
     def __init__(self, config: ServerConfig, counters: Counters, keys: ServerKeys | None = None) -> None:
         """Binds all sockets; raises `ListenError` or `ConfigError`, and then holds none.
 
-        With `keys` only clients on their list may subscribe, and the page, which has none, stays on this machine.
+        With `keys` only clients on their list may subscribe, and browsers, which have none, stay on this machine.
         """
         self._counters, self._keys = counters, keys
         self._context = zmq.Context()
@@ -37,7 +37,7 @@ class Publisher:
         self._senders: list[tuple[str, VmcSender | LiveLinkJsonSender]] = []
         try:
             self._pub = self._bind_pub(config.host, config.port)
-            self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.page_port)
+            self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.web_port)
             if config.vmc is not None:
                 self._senders.append(("vmc", VmcSender(*_resolve("--vmc", config.vmc))))
             if config.livelink is not None:
@@ -47,7 +47,7 @@ class Publisher:
             raise
         self.addresses = {
             "hands": self._pub.getsockopt_string(zmq.LAST_ENDPOINT),
-            "page": self._web.address,
+            "web": self._web.address,
         }
         """What it listens on, by what it carries."""
 
@@ -62,7 +62,7 @@ class Publisher:
         self._counters.add("messages_out", topic="bin")
         if self._web.client_count:
             self._web.publish(binary)
-            self._counters.add("messages_out", topic="page")
+            self._counters.add("messages_out", topic="web")
         for topic, sender in self._senders:
             try:
                 sender.send(message)
@@ -120,8 +120,8 @@ def _bind_web(host: str, port: int) -> WebSocketPublisher:
         return WebSocketPublisher(host, port)
     except OSError as error:
         raise ListenError(
-            f"--page-port: cannot listen on {host}:{port}: {error.strerror or error}; "
-            "is another program using it? --page-port 0 takes any free port"
+            f"--web-port: cannot listen on {host}:{port}: {error.strerror or error}; "
+            "is another program using it? --web-port 0 takes any free port"
         ) from None
 
 

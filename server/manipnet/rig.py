@@ -23,6 +23,7 @@ SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
     "control_port": (int,),
     "osc_port": (int,),
     "page_port": (int,),
+    "web_port": (int,),
     "metrics_port": (int,),
     "natnet": (str,),
     "multicast": (bool,),

@@ -100,7 +100,7 @@ class Server:
             "bodies": self._listen(opened, "--input-port", self._zmq_bodies()),
             "control": control.address,
             "osc": self._listen(opened, "--osc-port", self._osc_bodies()),
-            "page": publisher.addresses["page"],
+            "web": publisher.addresses["web"],
         }
         if config.natnet is not None:
             addresses["natnet"] = self._listen(opened, "--natnet", self._motive(*config.natnet))

@@ -53,7 +53,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
-    "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "page")),
+    "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "web")),
     "control_requests": ("op", CONTROL_OPS),
 }
 """Every counter with its one label and the values that label may take."""

@@ -27,7 +27,7 @@ def perform_until(stage: Stage, done: Callable[[], bool]) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_client_reads_the_server(stage: Stage, harness, name: str) -> None:
     addresses = stage.server.addresses
-    client = LiveClient.start(harness(name), addresses["page" if name == "javascript" else "hands"])
+    client = LiveClient.start(harness(name), addresses["web" if name == "javascript" else "hands"])
     try:
         perform_until(stage, lambda: client.ask()["received"] > 60)
         figures = client.ask()

@@ -47,8 +47,8 @@ class Stage:
             words = [sys.executable, str(ROOT / "tests" / "clients" / "publisher.py")]
             words += ["--port", ports[0], "--websocket-port", ports[1], "--session", str(time.monotonic_ns())]
         else:
-            others = ["--input-port", "0", "--control-port", "0", "--osc-port", "0"]
-            words = [*shlex.split(self.serve), "--port", ports[0], "--page-port", ports[1], *others]
+            others = ["--input-port", "0", "--control-port", "0", "--osc-port", "0", "--page-port", "0"]
+            words = [*shlex.split(self.serve), "--port", ports[0], "--web-port", ports[1], *others]
         with ExitStack() as started:
             process = started.enter_context(_running(words))
             assert process.stdout is not None

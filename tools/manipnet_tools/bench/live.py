@@ -32,7 +32,7 @@ SETTLE_S = 1.0
 QUIET_S = 1.0
 """No hands for this long after the last body: they have all come."""
 TOLERANCE_S = 1e-6
-_PORTS = ("port", "input-port", "control-port", "osc-port", "page-port")
+_PORTS = ("port", "input-port", "control-port", "osc-port", "page-port", "web-port")
 
 
 class ServeError(RuntimeError):
