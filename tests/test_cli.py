@@ -39,7 +39,9 @@ def error_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="0"):
         cli.main([verb, "--help"])
-    assert f"manipnet{'-' if verb == 'serve' else ' '}{verb}" in capsys.readouterr().out
+    text = capsys.readouterr().out
+    assert f"manipnet{'-' if verb == 'serve' else ' '}{verb}" in text
+    assert "examples:" in text
 
 
 def test_training_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,18 +15,78 @@ class Verb:
     summary: str
     module: str
     options: str | None = None
+    examples: tuple[str, ...] = ()
+    """Options and what they do, as `--help` shows them; none for a module that shows its own."""
 
 
 VERBS = {
     "serve": Verb("fingers live from tracked wrists and props (same as manipnet-serve)", "manipnet.cli"),
-    "replay": Verb("send a take to a server, as the tracker would", "manipnet_tools.replay", "ReplayOptions"),
-    "record": Verb("write what is tracked and synthesised to a recording", "manipnet_tools.record", "RecordOptions"),
-    "recover": Verb("mend a recording that was cut off", "manipnet_tools.recover", "RecoverOptions"),
-    "synthesize": Verb("fingers for a take, offline", "manipnet_tools.synthesize", "SynthesizeOptions"),
-    "evaluate": Verb("judge models on captured takes", "manipnet_tools.evaluate", "EvaluateOptions"),
-    "train": Verb("train a model on captured takes", "manipnet_tools.train", "TrainOptions"),
-    "bench": Verb("measure how long a tick takes, stage by stage", "manipnet_tools.bench"),
-    "doctor": Verb("say why no tracked bodies arrive", "manipnet.doctor"),
+    "replay": Verb(
+        "send a take to a server, as the tracker would",
+        "manipnet_tools.replay",
+        "ReplayOptions",
+        (
+            "takes/mug1 --to tcp://127.0.0.1:5556             to a server on this machine",
+            "take.mcap --to tcp://127.0.0.1:5556 --loop       a recording, over and over",
+            "motive.csv --to osc://127.0.0.1 --speed 0.5      Motive's export, over OSC, slowly",
+        ),
+    ),
+    "record": Verb(
+        "write what is tracked and synthesised to a recording",
+        "manipnet_tools.record",
+        "RecordOptions",
+        (
+            "--out take.mcap                          beside a running server, until Ctrl-C",
+            "--out take.mcap --rig stage.toml         and keep its rig and meshes in the file",
+            "--out take.mcap --bodies-port 5556       without a server: what the tracker sends",
+        ),
+    ),
+    "recover": Verb(
+        "mend a recording that was cut off",
+        "manipnet_tools.recover",
+        "RecoverOptions",
+        ("take.mcap --out mended.mcap",),
+    ),
+    "synthesize": Verb(
+        "fingers for a take, offline",
+        "manipnet_tools.synthesize",
+        "SynthesizeOptions",
+        (
+            "takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz",
+            "take.mcap --mesh Box=hammer.obj --out hammer.npz       the same take with another object",
+        ),
+    ),
+    "evaluate": Verb(
+        "judge models on captured takes",
+        "manipnet_tools.evaluate",
+        "EvaluateOptions",
+        (
+            "--data DATASET                                    the shipped model on the last 20 % of every take",
+            "--data DATASET --model models/mine --json figures.json",
+        ),
+    ),
+    "train": Verb(
+        "train a model on captured takes",
+        "manipnet_tools.train",
+        "TrainOptions",
+        ("--data DATASET --out models/mine",),
+    ),
+    "bench": Verb(
+        "measure how long a tick takes, stage by stage",
+        "manipnet_tools.bench",
+        None,
+        ("--only tick --seconds 20", "--json figures.json"),
+    ),
+    "doctor": Verb(
+        "say why no tracked bodies arrive",
+        "manipnet.doctor",
+        None,
+        (
+            "                                listen where the server would, for 5 s",
+            "--rig stage.toml                and say which of the rig's bodies are missing",
+            "--natnet 192.168.1.5            ask Motive there",
+        ),
+    ),
     "keys": Verb("make and list the keys that let clients in over the network", "manipnet.keys"),
 }
 
@@ -90,11 +150,18 @@ def _guarded(name: str, rest: list[str]) -> int:
 
 def _run(name: str, verb: Verb, rest: list[str]) -> int:
     module = importlib.import_module(verb.module)
-    if verb.options is None:
-        return module.main(rest) or 0
-    import tyro
+    try:
+        if verb.options is None:
+            return module.main(rest) or 0
+        import tyro
 
-    module.run(tyro.cli(getattr(module, verb.options), prog=f"manipnet {name}", args=rest))
+        config = (tyro.conf.FlagCreatePairsOff,)
+        options = tyro.cli(getattr(module, verb.options), prog=f"manipnet {name}", args=rest, config=config)
+    except SystemExit as end:
+        if not end.code and verb.examples:
+            print("\nexamples:", *(f"  manipnet {name} {example}" for example in verb.examples), sep="\n")
+        raise
+    module.run(options)
     return 0
 
 

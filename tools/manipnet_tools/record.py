@@ -5,7 +5,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+import tyro
 import zmq
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
@@ -33,25 +35,25 @@ class RecordOptions:
     """Record until Ctrl-C, or for --seconds.
 
     From a running server: its hands and, at 60 Hz, the bodies they were made from.
+
     Without a server (--bodies-port): the bodies a tracker sends here, as they come.
-    Example: manipnet record --out take.mcap --rig stage.toml
     """
 
-    out: Path
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """The file to write, .mcap; it must not exist."""
-    server: str = "127.0.0.1:5555"
-    """HOST:PORT of the server's hands."""
-    bodies_port: int | None = None
+    server: Annotated[str, tyro.conf.arg(metavar="HOST:PORT")] = "127.0.0.1:5555"
+    """Where the server's hands are."""
+    bodies_port: Annotated[int | None, tyro.conf.arg(metavar="PORT")] = None
     """Instead: listen here, in the place of a server, for senders of bodies over ZeroMQ."""
-    control: str = "127.0.0.1:5557"
-    """HOST:PORT of the server's requests, which is asked about its model and objects."""
-    actor: str | None = None
+    control: Annotated[str, tyro.conf.arg(metavar="HOST:PORT")] = "127.0.0.1:5557"
+    """Where the server takes requests: it is asked about its model and objects."""
+    actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
     """Whose bodies to record where there are several actors; by default the first one's that is heard."""
-    rig: Path | None = None
+    rig: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """The server's rig file: it and its meshes are kept in the recording."""
-    keys: Path | None = None
+    keys: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """The client's key file, where the server asks for one."""
-    seconds: float | None = None
+    seconds: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
     """Stop after this long."""
 
 

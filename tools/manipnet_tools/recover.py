@@ -12,14 +12,11 @@ from manipnet.recording import BODIES, HANDS, recover
 
 @dataclass(frozen=True)
 class RecoverOptions:
-    """Mend a recording whose end is missing, after a crash or a power cut. The file itself is left alone.
-
-    Example: manipnet recover take.mcap --out mended.mcap
-    """
+    """Mend a recording whose end is missing, after a crash or a power cut. The file itself is left alone."""
 
     recording: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RECORDING")]
     """The recording to read."""
-    out: Path
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """The file to write; it must not exist."""
 
 

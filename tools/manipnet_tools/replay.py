@@ -27,20 +27,17 @@ SHOW_S = 0.2
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """Stream a take to a running server.
-
-    Example: manipnet replay takes/mug1 --to tcp://127.0.0.1:5556 --loop
-    """
+    """Stream a take to a running server."""
 
     take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
     """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
     to: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT|osc://HOST:PORT")]
     """Where to: the server's --input-port over ZeroMQ (tcp://) or its --osc-port (osc://)."""
-    speed: float = 1.0
+    speed: Annotated[float, tyro.conf.arg(metavar="TIMES")] = 1.0
     """Times as fast. Time stamps stay the take's own."""
     loop: bool = False
     """Play over and over, until stopped; time goes on rising."""
-    rate: float | None = None
+    rate: Annotated[float | None, tyro.conf.arg(metavar="HZ")] = None
     """Frames per second, resampled; the take's own rate by default."""
 
 

@@ -28,11 +28,11 @@ class SynthesizeOptions:
     """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
     mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")]
     """Objects of the take that are handled, each with its mesh in metres."""
-    out: Path
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """The file to write, .npz."""
-    model: str = DEFAULT_MODEL
+    model: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_MODEL
     """A shipped bundle's name or a bundle folder."""
-    look_ahead: float = MAX_LOOK_AHEAD_S
+    look_ahead: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
     """Seconds of the future the synthesis knows, 0 to 0.5; the rest it forecasts."""
 
 
