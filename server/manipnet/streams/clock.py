@@ -4,7 +4,6 @@ The idea is NTP's: the remote clock is read somewhere between our sending and ou
 two is off by at most half the round trip.
 """
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,20 +21,24 @@ class ClockOffset:
 
 
 class ClockProbes:
-    """The newest exchanges with one remote clock. Pure: all times are arguments, in seconds."""
+    """The newest exchanges with one remote clock. Pure: all times are arguments, in seconds.
+
+    One thread may add while others read: what they read is replaced, never changed.
+    """
 
     def __init__(self, keep: int = PROBES) -> None:
-        self._probes: deque[tuple[float, ClockOffset]] = deque(maxlen=keep)
+        self._keep = keep
+        self._probes: tuple[tuple[float, ClockOffset], ...] = ()
 
     def add(self, sent_s: float, remote_s: float, received_s: float) -> None:
         """One exchange: our clock at sending and receiving, the remote one's reading in between."""
         if received_s >= sent_s:
             offset = ClockOffset(remote_s - (sent_s + received_s) / 2.0, (received_s - sent_s) / 2.0)
-            self._probes.append((received_s, offset))
+            self._probes = (*self._probes, (received_s, offset))[-self._keep :]
 
     def clear(self) -> None:
         """Forget all: the remote clock has started anew."""
-        self._probes.clear()
+        self._probes = ()
 
     def best(self, now_s: float) -> ClockOffset | None:
         """The surest offset at `now_s`, None before the first probe."""

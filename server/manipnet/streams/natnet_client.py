@@ -34,6 +34,10 @@ SILENT_S = 3.0
 CHORES_S = 0.1
 
 UpAxis = Literal["y", "z"]
+_STREAMS_MULTICAST = (
+    "the server streams multicast: start with --multicast, or choose Unicast as Transmission Type in Motive's "
+    "streaming settings"
+)
 _log = logging.getLogger(__name__)
 
 
@@ -195,26 +199,22 @@ class NatNetBodies:
             return
         if info != self._info or now_s - self._heard_s > SILENT_S:
             self._clock.clear()
-        self._problem, self._info, self._names_wanted = None, info, True
-        if self._multicast:
-            self._join(info)
-        elif info.multicast_group is not None:
-            self._report(
-                "the server streams multicast: start with --multicast, or choose Unicast as Transmission Type "
-                "in Motive's streaming settings"
-            )
+        self._info, self._names_wanted = info, True
+        self._report(self._listen_to(info))
 
-    def _join(self, info: ServerInfo) -> None:
-        if self._data is not None:
-            return
-        group = info.multicast_group or MULTICAST_GROUP
-        try:
-            data = join_multicast(group, info.data_port, self._interface or "0.0.0.0")
-        except ListenError as error:
-            self._report(str(error))
-            return
-        self._data = UdpThread(data, self._receive, lambda now_s: CHORES_S, self._lost)
-        self._data.start()
+    def _listen_to(self, info: ServerInfo) -> str | None:
+        """Join the server's multicast group where that was asked for; says why its frames will not come, or None."""
+        if not self._multicast:
+            return None if info.multicast_group is None else _STREAMS_MULTICAST
+        if self._data is None:
+            group = info.multicast_group or MULTICAST_GROUP
+            try:
+                data = join_multicast(group, info.data_port, self._interface or "0.0.0.0")
+            except ListenError as error:
+                return str(error)
+            self._data = UdpThread(data, self._receive, lambda now_s: CHORES_S, self._lost)
+            self._data.start()
+        return None
 
     def _take_frame(self, payload: bytes, source: str, now_s: float) -> None:
         if self._info is None:
@@ -236,10 +236,11 @@ class NatNetBodies:
             (x, y, z), (qx, qy, qz) = (x, z, -y), (qx, qz, -qy)
         return make_sample(body.id, self._names.get(body.id), (x, y, z), (qx, qy, qz, qw), body.tracked)
 
-    def _report(self, problem: str) -> None:
-        if problem != self._problem:
+    def _report(self, problem: str | None) -> None:
+        """Say once what is wrong. One assignment: whoever asks for the status never sees a problem flicker."""
+        before, self._problem = self._problem, problem
+        if problem is not None and problem != before:
             _log.warning("NatNet: %s", problem)
-            self._problem = problem
 
     def _lost(self, count: int) -> None:
         self._intake.drop("kernel", "natnet", "the socket's buffer was full", count)
