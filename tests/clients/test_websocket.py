@@ -66,7 +66,7 @@ def test_other_pages_may_not(publisher, origin):
 def test_a_crowd_is_bounded(publisher):
     with ExitStack() as crowd:
         for _ in range(MAX_CLIENTS):
-            receive(publisher, crowd.enter_context(connect(publisher.address)), b"x")
+            receive(publisher, crowd.enter_context(connect(publisher.address, max_queue=None)), b"x")
         with connect(publisher.address) as late, pytest.raises(ConnectionClosed, match="at most 32 clients"):
             late.recv(timeout=10)
 
