@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from manipnet.config import WRISTS, ActorConfig, BodyKey
-from manipnet.geometry import Array, compose
+from manipnet.config import WRISTS, ActorConfig, BodyConfig, BodyKey
+from manipnet.geometry import Array, compose, invert
 from manipnet.network.bundle import Bundle
 from manipnet.objects.shape import Shape
 from manipnet.output_guard import OutputGuard
@@ -21,6 +21,8 @@ from manipnet.timeline import TICK_S, BodyAtTick, BodyHealth, Tick, Timeline
 SIDES: Final[tuple[Side, Side]] = ("left", "right")
 AT_REST_RAD: Final = 0.03
 """Fingers this near to the rest pose are there."""
+ON_THE_BODY: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+"""The offset of what is its body."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +96,7 @@ class Actor:
         self.hands: dict[Side, Hand] = {
             side: Hand(side, bundle, counters) for side in SIDES if f"{side}_wrist" in config.wrists
         }
-        self._parts = _parts(config)
+        self._parts, self._offsets = _parts(config), _offsets(config)
         self._last: tuple[int, int] | None = None
 
     def push(self, frame: BodyFrame) -> str | None:
@@ -104,7 +106,7 @@ class Actor:
             part = self._parts.get(sample.id) if sample.id is not None else None
             part = part or (self._parts.get(sample.name) if sample.name is not None else None)
             if part is not None:
-                poses[part[0]] = _pose(sample, part[1]) if sample.tracked else None
+                poses[part] = _pose(sample, self._offsets.get(part)) if sample.tracked else None
         if not poses:
             return "unknown_body"
         return self.timeline.push(frame.t_s, poses, frame.t_received_s, frame.source)
@@ -119,17 +121,40 @@ class Actor:
 
         Raises `ValueError` for the body of a wrist.
         """
-        known = {name for name, _ in self._parts.values()}
-        if body in self._parts or body not in known:
-            name, offset = self._parts.get(body, (str(body), None))
-            self._parts |= dict.fromkeys(_aliases(body), (name, offset))
-        else:
+        name = self.part(body)
+        if name is None:
             name = str(body)
+            self._parts |= dict.fromkeys(_aliases(body), name)
         if name in WRISTS:
             raise ValueError(f"body {body!r} is the {name}; give the body of a prop")
         prop = Prop(name, object_name, shape, scale)
         self.props = [other for other in self.props if other.name != name] + [prop]
         return prop
+
+    def part(self, body: BodyKey) -> str | None:
+        """What this actor calls a body, given by its key in the stream or by that name; None for a stranger."""
+        return self._parts.get(body) or (str(body) if body in self._parts.values() else None)
+
+    def body_poses(self, part: str, seconds: float) -> Array:
+        """The body itself of a wrist or prop, without its offset, in the newest `seconds`: `(n, 7)`."""
+        return compose(self.timeline.recent(part, seconds), invert(self.offset(part)))
+
+    def offset(self, part: str) -> Array:
+        """Where a wrist or prop sits on its body, `(7,)`."""
+        return self._offsets.get(part, ON_THE_BODY)
+
+    def place(self, part: str, offset: Array) -> None:
+        """Let a wrist or prop sit elsewhere on its body from now on: `offset (7,)` is T_body_part."""
+        self.timeline.move(part, compose(invert(self.offset(part)), offset))
+        self._offsets[part] = offset
+        config = self.config
+        wrists = {name: _placed(body, offset) if name == part else body for name, body in config.wrists.items()}
+        objects = (replace(o, body=_placed(o.body, offset)) if o.name == part else o for o in config.objects)
+        self.config = replace(config, wrists=wrists, objects=tuple(objects))
+
+    def resize_hands(self, hand_scale: float) -> None:
+        """The hands are of another size from now on."""
+        self.config = replace(self.config, hand_scale=hand_scale)
 
     def rest(self) -> None:
         """Ease both hands to the rest pose; they are synthesised anew from there."""
@@ -180,7 +205,7 @@ class Actor:
     def health(self, now_s: float) -> dict[str, BodyHealth]:
         """Of every body of the rig, as the stream has it now; one never heard of has an infinite age."""
         heard = self.timeline.health(now_s)
-        parts = dict.fromkeys(name for name, _ in self._parts.values())
+        parts = dict.fromkeys(self._parts.values())
         return {name: heard.get(name, BodyHealth(0.0, np.inf)) for name in parts}
 
     def recover(self) -> None:
@@ -217,12 +242,20 @@ class Actor:
         return (tick.index - self._last[1]) * TICK_S
 
 
-def _parts(config: ActorConfig) -> dict[BodyKey, tuple[str, Array | None]]:
-    """What each body is to this actor: the part's name and where it sits on the body."""
-    parts = {alias: (wrist, body.offset) for wrist, body in config.wrists.items() for alias in _aliases(body.key)}
-    for thing in config.objects:
-        parts |= dict.fromkeys(_aliases(thing.body.key), (thing.name, thing.body.offset))
-    return parts
+def _parts(config: ActorConfig) -> dict[BodyKey, str]:
+    """What each body is to this actor."""
+    parts = {alias: wrist for wrist, body in config.wrists.items() for alias in _aliases(body.key)}
+    return parts | {alias: thing.name for thing in config.objects for alias in _aliases(thing.body.key)}
+
+
+def _offsets(config: ActorConfig) -> dict[str, Array]:
+    """Where each part sits on its body, unless it is that body."""
+    bodies = config.wrists | {thing.name: thing.body for thing in config.objects}
+    return {part: body.offset for part, body in bodies.items() if body.offset is not None}
+
+
+def _placed(body: BodyConfig, offset: Array) -> BodyConfig:
+    return replace(body, offset=offset)
 
 
 def _aliases(key: BodyKey) -> tuple[BodyKey, ...]:

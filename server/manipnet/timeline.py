@@ -17,7 +17,7 @@ import numpy as np
 
 from manipnet.body_track import TIME_TOLERANCE_S, BodyTrack, Forecast, sample
 from manipnet.forecast import damped_velocity
-from manipnet.geometry import Array
+from manipnet.geometry import Array, compose
 from manipnet.network.layout import PRESENT, WINDOW_OFFSETS_S
 
 TICK_HZ: Final = 60
@@ -227,6 +227,21 @@ class Timeline:
         clock = self._run.clock_s(now_s)
         tracks = self._run.tracks.items()
         return {key: BodyHealth(1.0 / track.interval_s(), track.age_s(clock)) for key, track in tracks}
+
+    def recent(self, key: str, seconds: float) -> Array:
+        """Tracked poses `(n, 7)` of a body in the newest `seconds` of the stream, rising in time."""
+        track = None if self._run is None else self._run.tracks.get(key)
+        if self._run is None or track is None:
+            return np.empty((0, 7))
+        return track.poses[track.times >= self._run.newest_s - seconds].copy()
+
+    def move(self, key: str, T_old_new: Array) -> None:
+        """What sits on a body sits elsewhere on it from now on: move what was heard of it along, so nothing jumps
+        between past and future."""
+        for run in (self._run, self._ending):
+            if run is not None and key in run.tracks:
+                poses = run.tracks[key].poses
+                poses[:] = compose(poses, T_old_new)
 
     def _due_s(self, run: Run, index: int) -> float:
         """Stream time that must have arrived for a tick."""
