@@ -1,17 +1,19 @@
 """Requests to a real server: every operation, and everything that is none."""
 
+import base64
 import json
 
 import msgpack
+import numpy as np
 import pytest
 import zmq
 
 from live_server import Stage, scene
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
 from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
-from manipnet.objects.library import library_names
+from manipnet.objects.library import library_names, load_library_mesh
 
-OPS = "hello, ping, status, objects, select_object, look_ahead, rest"
+OPS = "hello, ping, status, objects, mesh, select_object, look_ahead, rest"
 
 
 @pytest.mark.parametrize("as_json", [True, False])
@@ -41,6 +43,18 @@ def test_status_tells_the_health_of_every_body_and_hand(stage: Stage) -> None:
     assert actor["hands"]["left"]["state"] in ("live", "hold", "rest")
     assert status["counters"]["frames_in"]["zmq"] > 100
     assert 0.0 < status["delay_ms"]["p50"] <= status["delay_ms"]["max"]
+
+
+def test_the_mesh_that_a_body_carries_can_be_had(stage: Stage) -> None:
+    stage.server.ask({"op": "select_object", "body": "Box", "object": "cube", "scale": 0.5})
+    answer = stage.server.ask({"op": "mesh", "body": "Box"}, as_json=True)
+    assert (answer["object"], answer["scale"]) == ("cube", 0.5)
+    mesh = load_library_mesh("cube")
+    vertices = np.frombuffer(base64.b64decode(answer["vertices"]), "<f4").reshape(-1, 3)
+    faces = np.frombuffer(base64.b64decode(answer["faces"]), "<u4").reshape(-1, 3)
+    assert np.allclose(vertices, mesh.vertices, atol=1e-6)
+    assert np.array_equal(faces, mesh.faces)
+    assert "allowed are Box" in stage.server.ask({"op": "mesh", "body": "Cup"})["error"]
 
 
 def test_an_object_is_swapped_while_the_hands_are_on_it(stage: Stage) -> None:

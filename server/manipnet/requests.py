@@ -1,6 +1,7 @@
 """What clients may ask of a running server. Handlers run on the control thread and touch the actors only through the
 mailbox, between two ticks."""
 
+import base64
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -48,6 +49,7 @@ class Requests:
             "ping": ping,
             "status": self._status,
             "objects": self._objects,
+            "mesh": self._mesh,
             "select_object": self._select_object,
             "look_ahead": self._look_ahead,
             "rest": self._rest,
@@ -78,6 +80,19 @@ class Requests:
         return {
             "objects": list(self._wardrobe.names()),
             "bodies": {actor: {prop.name: _prop(prop) for prop in props} for actor, props in carried.items()},
+        }
+
+    def _mesh(self, request: Request) -> dict[str, Any]:
+        actor = self._actor(request)
+        props = {prop.name: prop for prop in self._ask(lambda: list(actor.props))}
+        prop = props[choice(request, "body", tuple(props))]
+        mesh = prop.shape.mesh
+        return {
+            "actor": actor.config.name,
+            "body": prop.name,
+            **_prop(prop),
+            "vertices": base64.b64encode(mesh.vertices.astype("<f4").tobytes()).decode(),
+            "faces": base64.b64encode(mesh.faces.astype("<u4").tobytes()).decode(),
         }
 
     def _select_object(self, request: Request) -> dict[str, Any]:

@@ -41,7 +41,7 @@ BODY_REASONS = (
     "zeros",  # at exactly the origin, far from where it was: a relay's way to say lost
 )
 
-CONTROL_OPS = ("hello", "ping", "status", "objects", "select_object", "look_ahead", "rest", "invalid")
+CONTROL_OPS = ("hello", "ping", "status", "objects", "mesh", "select_object", "look_ahead", "rest", "invalid")
 
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "frames_in": ("source", SOURCES),
