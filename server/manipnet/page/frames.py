@@ -1,0 +1,54 @@
+"""What the server hands to its live page: one tick of one actor, and the shapes it is about."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from manipnet.geometry import Array
+from manipnet.streams.wire import HandsMessage, Side
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PropView:
+    """A prop: its body's name, its shape's name and hash, its size over the shape's."""
+
+    name: str
+    object: str
+    content_hash: str
+    scale: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandView:
+    """What one hand was synthesised from and to, in its own wrist frame as a right hand of the model's size."""
+
+    prop: str
+    positions: Array
+    """`(22, 3)` before the tick: where the sensors sat."""
+    rotations: Array
+    """`(17, 3, 3)` before the tick."""
+    distances: Array
+    """`(22,)` joint to surface, as predicted."""
+    raw_positions: Array
+    """`(22, 3)` before inverse kinematics."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One tick of one actor. `windows` are the trajectories `(21, 7)` about it, by body."""
+
+    message: HandsMessage
+    props: tuple[PropView, ...]
+    windows: Mapping[str, Array]
+    hands: Mapping[Side, HandView]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShapeView:
+    """A closed mesh: `vertices (V, 3)` metres, `faces (F, 3)`."""
+
+    name: str
+    content_hash: str
+    vertices: Array
+    faces: np.ndarray

@@ -1,0 +1,101 @@
+"""What a hand sensed and aimed for at a tick, computed anew for the eye: in the page's process, by the same kernels."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from manipnet.geometry import Array, mirror_points, mirror_poses, transform
+from manipnet.ik.targets import place_targets
+from manipnet.objects.mesh import ClosedMesh
+from manipnet.objects.shape import Shape, build_shape
+from manipnet.page.frames import Frame, HandView, ShapeView
+from manipnet.sensing.ambient import CELL_M, CELLS, CENTER_M, sense_ambient
+from manipnet.sensing.proximity import SENSOR_COUNT, SENSORS, aim_rays, place_sensors, proximity
+from manipnet.sensing.scene import object_from_wrist
+from manipnet.streams.wire import Side
+
+_STEPS: Final = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
+CELL_CENTERS: Final = CENTER_M + np.stack(np.meshgrid(_STEPS, _STEPS, _STEPS, indexing="ij"), axis=-1).reshape(-1, 3)
+"""`(1000, 3)` in the wrist frame of a right hand, in the order of the sensor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Senses:
+    """One hand's, in the world: occupancy `ambient (1000,)` of `cells (1000, 3)`; sensor `points`, `normals (104, 3)`
+    and `readings (104,)` in metres; joints before `raw (22, 3)` and `targets (22, 3)` of inverse kinematics."""
+
+    cells: Array
+    ambient: Array
+    points: Array
+    normals: Array
+    readings: Array
+    raw: Array
+    targets: Array
+
+
+class Senser:
+    """Senses with shapes, each of which is built, or read from the cache, once."""
+
+    def __init__(self) -> None:
+        self._shapes: dict[str, Shape] = {}
+
+    def sense(self, frame: Frame, side: Side, view: ShapeView, prop_scale: float) -> Senses:
+        """What the hand of one side sensed of the shape it was about."""
+        hand, size = frame.hands[side], frame.message.hands[side].scale
+        wrist, obj = (_present(frame, name, size) for name in (f"{side}_wrist", hand.prop))
+        mirrored = side == "left"
+        if mirrored:
+            wrist, obj = mirror_poses(wrist), mirror_poses(obj)
+        rotation, translation = np.empty((3, 3)), np.empty(3)
+        object_from_wrist(wrist, obj, mirrored, rotation, translation)
+        local = self._in_wrist(hand, self._shape(view), rotation, translation, prop_scale / size)
+
+        def world(points: Array) -> Array:
+            real = mirror_points(points) if mirrored else points
+            return transform(_present(frame, f"{side}_wrist", 1.0), size * real)
+
+        origin = world(np.zeros((1, 3)))
+        return Senses(
+            world(local.cells),
+            local.ambient,
+            world(local.points),
+            (world(local.normals) - origin) / size,
+            local.readings * size,
+            world(local.raw),
+            world(local.targets),
+        )
+
+    def _in_wrist(self, hand: HandView, shape: Shape, rotation: Array, translation: Array, scale: float) -> Senses:
+        ambient, targets = np.empty(len(CELL_CENTERS), np.float32), np.empty((22, 3))
+        points, normals = np.empty((SENSOR_COUNT, 3)), np.empty((SENSOR_COUNT, 3))
+        origins, directions = (np.empty((SENSOR_COUNT, 3), np.float32) for _ in range(2))
+        sense_ambient(shape.field, rotation, translation, scale, ambient)
+        place_sensors(SENSORS, hand.positions, hand.rotations, points, normals)
+        aim_rays(rotation, translation, scale, points, normals, origins, directions)
+        readings = proximity(shape.rays, origins, directions, np.full(SENSOR_COUNT, scale))
+        place_targets(
+            shape.bvh,
+            shape.field,
+            rotation,
+            translation,
+            scale,
+            shape.exact_within_m,
+            hand.raw_positions,
+            hand.distances,
+            targets,
+        )
+        return Senses(CELL_CENTERS, ambient, points, normals, readings, hand.raw_positions, targets)
+
+    def _shape(self, view: ShapeView) -> Shape:
+        if view.content_hash not in self._shapes:
+            mesh = ClosedMesh(view.name, view.vertices, view.faces, view.content_hash)
+            self._shapes[view.content_hash] = build_shape(mesh)
+        return self._shapes[view.content_hash]
+
+
+def _present(frame: Frame, name: str, size: float) -> Array:
+    """Where a body is at the tick, as a hand of the model's size would see it."""
+    pose = frame.windows[name][len(frame.windows[name]) // 2].copy()
+    pose[:3] /= size
+    return pose
