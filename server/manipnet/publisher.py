@@ -88,7 +88,7 @@ class Publisher:
         pub.setsockopt(zmq.SNDHWM, SEND_HIGH_WATER_MARK)
         pub.setsockopt(zmq.HEARTBEAT_IVL, 1_000)
         pub.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
-        pub.setsockopt(zmq.MAXMSGSIZE, 256)  # subscriptions are all that comes in
+        pub.setsockopt(zmq.MAXMSGSIZE, 1024)  # subscriptions are all that comes in, and CURVE's handshake
         pub.setsockopt(zmq.IPV6, int(ipv6))
         guard(pub, self._context, self._keys, self._counters)
         bind(pub, endpoint, "--port")
