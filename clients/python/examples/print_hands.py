@@ -1,4 +1,4 @@
-"""One line a second about what arrives: `python print_hands.py tcp://127.0.0.1:5555`."""
+"""One line a second about what arrives: `python print_hands.py [tcp://127.0.0.1:5555 [stage-pc.toml]]`."""
 
 import sys
 import time
@@ -8,7 +8,8 @@ import manipnet_client as manipnet
 
 def main() -> None:
     address = sys.argv[1] if len(sys.argv) > 1 else "tcp://127.0.0.1:5555"
-    with manipnet.Client(address) as client:
+    keys = sys.argv[2] if len(sys.argv) > 2 else None
+    with manipnet.Client(address, keys=keys) as client:
         while True:
             time.sleep(1.0)
             stats, hands = client.stats(), client.newest

@@ -30,7 +30,7 @@ def parse_address(address: str) -> tuple[str, int]:
 
 
 class Subscription:
-    """One connection, subscribed to one topic. Not thread-safe, but `close` may come from anywhere."""
+    """One connection, subscribed to one topic. Not thread-safe, but `interrupt` may come from anywhere."""
 
     def __init__(self, host: str, port: int, topic: bytes, max_bytes: int, timeout_s: float = 2.0):
         self._max_bytes = max_bytes
@@ -46,10 +46,13 @@ class Subscription:
             self._socket.close()
             raise
 
-    def close(self) -> None:
-        """Close the connection; a waiting `batches` then ends with `OSError`."""
+    def interrupt(self) -> None:
+        """End a waiting `batches` with `OSError`."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
+
+    def close(self) -> None:
+        """Close the connection."""
         self._socket.close()
 
     def batches(self) -> Iterator[list[bytes]]:
@@ -79,7 +82,7 @@ class Subscription:
             raise ZmtpError("the other side does not speak ZMTP 3")
         if greeting[12:32].rstrip(b"\0") != b"NULL":
             mechanism = greeting[12:32].rstrip(b"\0").decode("ascii", "replace")
-            raise ZmtpError(f"the server asks for {mechanism}; this client speaks NULL only: use a tunnel")
+            raise ZmtpError(f"the server asks for {mechanism}; give this client `keys`, or use a tunnel")
         self._socket.sendall(GREETING[SIGNATURE_BYTES:])
         self._send(COMMAND, b"\x05READY\x0bSocket-Type\x00\x00\x00\x03SUB")
         while not (ready := self._next_frame()):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncGenerator, Generator
+from os import PathLike
 
 from .client import Client, Stats
 from .interpolation import Interpolator, Shown
@@ -25,17 +26,20 @@ __all__ = [
 ]
 
 
-def subscribe(address: str, actor: str | None = None) -> Iterator[Hands]:
+def subscribe(
+    address: str, actor: str | None = None, keys: str | PathLike[str] | None = None
+) -> Generator[Hands, None, None]:
     """The newest hands, again and again, for as long as you iterate. Slow consumers skip frames, never lag.
 
-    Waits while there is no server. Raises `ValueError` for an address that is not `tcp://host:port`.
+    Waits while there is no server. `keys`: see `Client`. Raises `ValueError` for an address that is not
+    `tcp://host:port`.
     """
     parse_address(address)
-    return _iterate(address, actor)
+    return _iterate(address, actor, keys)
 
 
-def _iterate(address: str, actor: str | None) -> Iterator[Hands]:
-    with Client(address, actor) as client:
+def _iterate(address: str, actor: str | None, keys: str | PathLike[str] | None) -> Generator[Hands, None, None]:
+    with Client(address, actor, keys=keys) as client:
         hands = None
         while True:
             fresh = client.wait(after=hands, timeout_s=0.5)
@@ -44,9 +48,11 @@ def _iterate(address: str, actor: str | None) -> Iterator[Hands]:
                 yield hands
 
 
-async def subscribe_async(address: str, actor: str | None = None) -> AsyncIterator[Hands]:
+async def subscribe_async(
+    address: str, actor: str | None = None, keys: str | PathLike[str] | None = None
+) -> AsyncGenerator[Hands, None]:
     """As `subscribe`, for `async for`."""
-    client = Client(address, actor)
+    client = Client(address, actor, keys=keys)
     hands = None
     try:
         while True:

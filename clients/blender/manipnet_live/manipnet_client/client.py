@@ -5,12 +5,19 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from os import PathLike
+from typing import TYPE_CHECKING
 
 from . import layout
 from .interpolation import Interpolator, Shown
 from .message import Hands, MessageError, decode
 from .zmtp import Subscription, parse_address
+
+if TYPE_CHECKING:
+    from .curve import SecureSubscription
 
 BACK_OFF_S, BACK_OFF_LIMIT_S = 0.1, 1.0
 
@@ -38,11 +45,15 @@ class Stats:
 class Client:
     """Receives the hands of one actor (the first seen, unless named) from `tcp://host:port`.
 
-    Use as a context manager, or call `close`. All methods may be called from any thread.
+    `keys` names the file of `manipnet keys make NAME`, for a server that asks for one; it needs pyzmq. Use as a context
+    manager, or call `close`. All methods may be called from any thread. Raises `ValueError` for an address or a file of
+    keys that is none.
     """
 
-    def __init__(self, address: str, actor: str | None = None, delay_s: float = 0.1) -> None:
-        self._host, self._port = parse_address(address)
+    def __init__(
+        self, address: str, actor: str | None = None, delay_s: float = 0.1, keys: str | PathLike[str] | None = None
+    ) -> None:
+        self._open = _opener(address, keys)
         self._actor = actor
         self._news = threading.Condition()
         self._interpolator = Interpolator(delay_s)
@@ -51,7 +62,7 @@ class Client:
         self._last: tuple[str | None, int] = (None, 0)
         self._arrivals: deque[float] = deque(maxlen=layout.RATE_HZ)
         self._stats = Stats()
-        self._subscription: Subscription | None = None
+        self._subscription: Subscription | SecureSubscription | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="manipnet-client", daemon=True)
         self._thread.start()
@@ -66,7 +77,7 @@ class Client:
         """Stop the reader thread and wait for it."""
         self._stopping.set()
         if subscription := self._subscription:
-            subscription.close()
+            subscription.interrupt()
         with self._news:
             self._news.notify_all()
         self._thread.join()
@@ -109,8 +120,7 @@ class Client:
         self._set(state="closed")
 
     def _read(self) -> None:
-        subscription = Subscription(self._host, self._port, layout.TOPIC, layout.MAX_PAYLOAD_BYTES)
-        self._subscription = subscription
+        self._subscription = subscription = self._open()
         try:
             self._set(state="connected", connections=self._stats.connections + 1)
             for frames in subscription.batches():
@@ -149,3 +159,13 @@ class Client:
     def _set(self, **changes: object) -> None:
         with self._news:
             self._stats = replace(self._stats, **changes)  # type: ignore[arg-type]
+
+
+def _opener(address: str, keys: str | PathLike[str] | None) -> Callable[[], Subscription | SecureSubscription]:
+    """What makes a connection; raises `ValueError` where it never could."""
+    where = (*parse_address(address), layout.TOPIC, layout.MAX_PAYLOAD_BYTES)
+    if keys is None:
+        return partial(Subscription, *where)
+    from .curve import SecureSubscription, read_keys  # only who has keys needs pyzmq
+
+    return partial(SecureSubscription, *where, read_keys(keys))
