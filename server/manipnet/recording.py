@@ -9,6 +9,7 @@
 Log times are this machine's clock at the arrival, nanoseconds; the sender's clock is inside the messages. The meshes
 are attachments, the rig and the model's hash metadata, all before the first message. Chunks are small and handed to
 the system at once, so a process that is killed loses a fraction of a second; no reader here needs the end of a file.
+Sources: mcap.dev/spec; docs.foxglove.dev, "Message schemas", FrameTransforms.
 """
 
 import json
@@ -18,9 +19,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+import trimesh
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import Writer
+from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
@@ -36,33 +40,41 @@ FLUSH_NS: Final = 250_000_000
 """What a killed process loses at most, of the clock of the log times."""
 MAX_RECORD_BYTES: Final = 1 << 28
 
+
+def _record(title: str | None, **properties: dict[str, Any]) -> dict[str, Any]:
+    """JSON schema of an object that has all of `properties`."""
+    named = {"title": title} if title else {}
+    return named | {"type": "object", "properties": properties, "required": list(properties)}
+
+
 _NUMBERS = {"type": "array", "items": {"type": "number"}}
-_XYZ = {"type": "object", "properties": {axis: {"type": "number"} for axis in "xyz"}}
-_XYZW = {"type": "object", "properties": {axis: {"type": "number"} for axis in "xyzw"}}
-_TIME = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
+_NUMBER = {"type": "number"}
+_TEXT = {"type": "string"}
+_SECONDS = {"type": "integer", "minimum": 0}
 _BODY = {"id": {"type": "integer"}, "name": {"type": "string"}, "p": _NUMBERS, "q": _NUMBERS}
 _BODY_ITEM = {"type": "object", "properties": _BODY | {"tracked": {"type": "boolean"}}}
-_TRANSFORM = {
-    "timestamp": _TIME,
-    "parent_frame_id": {"type": "string"},
-    "child_frame_id": {"type": "string"},
-    "translation": _XYZ,
-    "rotation": _XYZW,
-}
-_SCHEMAS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
-    BODIES: (
+_TRANSFORM = _record(
+    "foxglove.FrameTransform",
+    timestamp={
+        "type": "object",
+        "title": "time",
+        "properties": {"sec": _SECONDS, "nsec": _SECONDS | {"maximum": 999_999_999}},
+    },
+    parent_frame_id=_TEXT,
+    child_frame_id=_TEXT,
+    translation=_record("foxglove.Vector3", x=_NUMBER, y=_NUMBER, z=_NUMBER),
+    rotation=_record("foxglove.Quaternion", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER),
+)
+_SCHEMAS: Final[dict[str, dict[str, Any]]] = {
+    BODIES: _record(
         "manipnet.Bodies",
-        {
-            "t": {"type": "number"},
-            "frame": {"type": ["integer", "null"]},
-            "bodies": {"type": "array", "items": _BODY_ITEM},
-        },
+        t=_NUMBER,
+        frame={"type": ["integer", "null"]},
+        bodies={"type": "array", "items": _BODY_ITEM},
     ),
-    TF: (
-        "foxglove.FrameTransforms",
-        {"transforms": {"type": "array", "items": {"type": "object", "properties": _TRANSFORM}}},
-    ),
+    TF: _record("foxglove.FrameTransforms", transforms={"type": "array", "items": _TRANSFORM}),
 }
+"""JSON schemas of the topics in JSON; the title is the schema's name, by which Foxglove knows its own."""
 
 _log = logging.getLogger(__name__)
 
@@ -77,7 +89,7 @@ class RecordingWriter:
     def __init__(self, path: Path, about: Mapping[str, str], meshes: Mapping[str, bytes] | None = None) -> None:
         """Start the file `path`, which must not exist (`FileExistsError`); other troubles raise `OSError`.
 
-        `about` becomes the metadata; `meshes` are mesh files by file name, whose stem is the object's.
+        `about` becomes the metadata; `meshes` are mesh files (`mesh_file`) by file name, whose stem is the object's.
         """
         self._file = path.open("xb")
         self._writer = Writer(self._file)
@@ -126,9 +138,9 @@ class RecordingWriter:
         self.close()
 
     def _channel(self, topic: str) -> int:
-        name, properties = _SCHEMAS[topic]
-        text = json.dumps({"title": name, "type": "object", "properties": properties}).encode()
-        return self._writer.register_channel(topic, "json", self._writer.register_schema(name, "jsonschema", text))
+        schema = _SCHEMAS[topic]
+        id = self._writer.register_schema(schema["title"], "jsonschema", json.dumps(schema).encode())
+        return self._writer.register_channel(topic, "json", id)
 
     def _add(self, topic: str, payload: bytes, now_ns: int) -> None:
         self._writer.add_message(self._channels[topic], now_ns, payload, now_ns, self._counts[topic])
@@ -147,6 +159,13 @@ class About:
     counts: Mapping[str, int]
     """Messages by topic."""
     whole: bool
+
+
+def mesh_file(vertices: Array, faces: NDArray[np.integer[Any]], scale: float = 1.0) -> bytes:
+    """A mesh as the file a recording keeps: PLY in metres, as large as it was on the stage."""
+    content = trimesh.Trimesh(scale * vertices, faces, process=False).export(file_type="ply")
+    assert isinstance(content, bytes)
+    return content
 
 
 def read_about(path: Path | str) -> About:

@@ -56,6 +56,17 @@ VERBS = {
             "take.mcap --mesh Box=hammer.obj --out hammer.npz       the same take with another object",
         ),
     ),
+    "export": Verb(
+        "hands and objects for other programs: BVH, glTF, CSV",
+        "manipnet_tools.export.command",
+        "ExportOptions",
+        (
+            "take.mcap --format gltf --out take.glb                     what a recording shows, to see anywhere",
+            "fingers.npz --format bvh --out fingers                     the ManipNet dataset's layout, in a folder",
+            "fingers.npz --format bvh --out fingers --right-handed      for Blender and Maya",
+            "takes/mug1 --format csv --out mug1.csv                     captured fingers as a table",
+        ),
+    ),
     "evaluate": Verb(
         "judge models on captured takes",
         "manipnet_tools.evaluate",

@@ -1,20 +1,22 @@
 """`manipnet record`: what a running server hears of the bodies and says of the hands, or what a tracker sends."""
 
+import base64
 import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 import tyro
 import zmq
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from manipnet.config import parse_endpoint
-from manipnet.objects.library import LIBRARY_FOLDER, library_names
-from manipnet.recording import BODIES, HANDS, RecordingError, RecordingWriter
+from manipnet.objects.mesh import load_mesh
+from manipnet.recording import BODIES, HANDS, RecordingError, RecordingWriter, mesh_file
 from manipnet.rig import load_rig
 from manipnet.streams.bodies import BodyFrame, BodySample, MessageError
 from manipnet.streams.curve import secure_client
@@ -62,7 +64,7 @@ def run(options: RecordOptions) -> None:
     about, meshes = read_rig(options.rig)
     if options.bodies_port is None:
         told, props = ask_server(options.control, options.keys)
-        about, meshes = told | about, props | meshes
+        about, meshes = told | about, meshes | props
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with (
         stop_on_signals() as stopping,
@@ -127,33 +129,42 @@ def bodies_of(message: HandsMessage) -> BodyFrame:
 
 
 def ask_server(control: str, keys: Path | None) -> tuple[dict[str, str], dict[str, bytes]]:
-    """Metadata and library meshes of a running server; nothing when it does not answer."""
+    """Metadata of a running server and the meshes its bodies carry; nothing when it does not answer."""
     with zmq.Context() as context, context.socket(zmq.REQ) as socket:
         _connect(socket, control, CONTROL_PORT, keys)
-        answers = []
-        for op in ("hello", "objects"):
-            socket.send(json.dumps({"op": op}).encode())
-            if not socket.poll(ANSWER_MS):
-                return {}, {}
-            answers.append(json.loads(socket.recv()))
-    hello, objects = answers
+        try:
+            hello, carried = _ask(socket, op="hello"), _ask(socket, op="objects")["bodies"]
+            where = {name: actor for actor, props in reversed(carried.items()) for name in props}
+            answers = {name: _ask(socket, op="mesh", actor=actor, body=name) for name, actor in where.items()}
+        except TimeoutError:
+            return {}, {}
     about = {key: str(hello[key]) for key in ("session", "model", "model_hash", "version") if key in hello}
-    carried = {name: prop for props in objects.get("bodies", {}).values() for name, prop in props.items()}
-    meshes = {
-        f"{name}.ply": (LIBRARY_FOLDER / f"{prop['object']}.ply").read_bytes()
-        for name, prop in carried.items()
-        if prop["object"] in library_names() and prop["scale"] == 1.0
-    }
-    return about | {"objects": json.dumps(carried)}, meshes
+    objects = {name: {"object": answer["object"], "scale": answer["scale"]} for name, answer in answers.items()}
+    meshes = {f"{name}.ply": _mesh_of(answer) for name, answer in answers.items()}
+    return about | {"objects": json.dumps(objects)}, meshes
+
+
+def _ask(socket: zmq.Socket, **request: str) -> dict[str, Any]:
+    socket.send(json.dumps(request).encode())
+    if not socket.poll(ANSWER_MS):
+        raise TimeoutError
+    return json.loads(socket.recv())
+
+
+def _mesh_of(answer: dict[str, Any]) -> bytes:
+    vertices = np.frombuffer(base64.b64decode(answer["vertices"]), "<f4").reshape(-1, 3)
+    faces = np.frombuffer(base64.b64decode(answer["faces"]), "<u4").reshape(-1, 3)
+    return mesh_file(vertices.astype(np.float64), faces, answer["scale"])
 
 
 def read_rig(file: Path | None) -> tuple[dict[str, str], dict[str, bytes]]:
-    """A rig file as metadata, and its meshes. Raises `ConfigError` and `OSError`."""
+    """A rig file as metadata, and its meshes in metres. Raises `ConfigError`, `MeshError` and `OSError`."""
     if file is None:
         return {}, {}
-    objects = [thing for actor in load_rig(file).actors for thing in actor.objects]
-    meshes = {f"{thing.name}{thing.mesh.suffix}": thing.mesh.read_bytes() for thing in objects}
-    return {"rig": file.read_text(encoding="utf-8")}, meshes
+    things = [thing for actor in load_rig(file).actors for thing in actor.objects]
+    meshes = {thing.name: load_mesh(thing.mesh, thing.unit, thing.scale) for thing in reversed(things)}
+    files = {f"{name}.ply": mesh_file(mesh.vertices, mesh.faces) for name, mesh in meshes.items()}
+    return {"rig": file.read_text(encoding="utf-8")}, files
 
 
 def _connect(socket: zmq.Socket, address: str, default_port: int, keys: Path | None) -> None:

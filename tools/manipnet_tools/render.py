@@ -136,7 +136,7 @@ class _Scene:
         for solid in solids:
             faces = np.asarray(solid.faces)
             corners.append(np.asarray(solid.vertices, dtype=np.float64)[faces])
-            normals.append(_corner_normals(np.asarray(solid.vertices), faces))
+            normals.append(corner_normals(np.asarray(solid.vertices), faces))
             colors.append(np.broadcast_to(solid.color, (len(solid.vertices), 3))[faces])
         self._normals, self._colors = np.concatenate(normals), np.concatenate(colors)
         self._ground_from = len(self._normals) - (2 if ground else 0)
@@ -198,7 +198,7 @@ class _Scene:
         )
 
 
-def _corner_normals(vertices: Array, faces: NDArray[np.int64]) -> Array:
+def corner_normals(vertices: Array, faces: NDArray[np.int64]) -> Array:
     """A normal per face corner, `(F, 3, 3)`: faces around a vertex are averaged unless a crease lies between them."""
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     area_normals = np.cross(b - a, c - a)

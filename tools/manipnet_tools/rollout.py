@@ -14,7 +14,7 @@ from manipnet.objects.shape import Shape
 from manipnet.props import Prop, choose_prop
 from manipnet.synthesis import HandScene, HandStep, Side, Synthesizer
 from manipnet.timeline import MAX_LOOK_AHEAD_S, BodyAtTick, Tick, Timeline
-from manipnet_tools.takes import Take
+from manipnet_tools.takes import Take, TakeError
 
 SIDES: tuple[Side, ...] = ("left", "right")
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
@@ -97,7 +97,7 @@ class HandMotion:
 def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
     """Stream a take into a `Timeline` and collect the ticks whose future has arrived when it ends.
 
-    The first half second, whose past is not in the take, is left out.
+    The first half second, whose past is not in the take, is left out. Raises `TakeError` when nothing remains.
     """
     timeline = Timeline(look_ahead_s)
     ticks: list[Tick] = []
@@ -108,6 +108,8 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
             ticks.append(tick)
     names = take.bodies.keys()
     whole = [t for t in ticks if t.time_s - ticks[0].time_s >= MAX_LOOK_AHEAD_S and names <= t.bodies.keys()]
+    if not whole:
+        raise TakeError(_too_little(take, ticks))
     return Ticks(
         np.array([t.time_s for t in whole]) - float(take.time_s[0]),
         {
@@ -119,6 +121,13 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
             for name in names
         },
     )
+
+
+def _too_little(take: Take, ticks: Sequence[Tick]) -> str:
+    if never := [name for name in take.bodies if not any(name in tick.bodies for tick in ticks)] if ticks else []:
+        return f"{take.name}: {', '.join(never)} is never tracked where the others are"
+    length_s = float(take.time_s[-1] - take.time_s[0])
+    return f"{take.name}: is {length_s:.2f} s long; fingers need half a second before and after, so more than 1 s"
 
 
 def hand_inputs(ticks: Ticks, shapes: dict[str, Shape]) -> dict[Side, HandInput]:

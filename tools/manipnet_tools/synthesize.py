@@ -1,21 +1,23 @@
 """`manipnet synthesize`: fingers for a take, offline, by the synthesis of the live server."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import IO, Annotated, Any
 
 import numpy as np
 import tyro
 from rich.console import Console
 from rich.progress import Progress
 
+from manipnet.config import WRISTS
 from manipnet.geometry import Array
 from manipnet.network.bundle import DEFAULT_MODEL, load_bundle
 from manipnet.objects.mesh import closed_mesh, load_mesh
 from manipnet.objects.shape import Shape, build_shape, load_shape
 from manipnet.synthesis import Synthesizer, hand_to_world
 from manipnet.timeline import MAX_LOOK_AHEAD_S
+from manipnet_tools.meshes import named_files, recorded_meshes
 from manipnet_tools.rollout import Ticks, hand_inputs, roll_out, tick_take
 from manipnet_tools.takes import Take, TakeError, read_take
 
@@ -27,7 +29,7 @@ class SynthesizeOptions:
     take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
     """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
     mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")]
-    """Objects of the take that are handled, each with its mesh in metres."""
+    """Objects of the take that are handled, each with its mesh in metres; without any, those a recording keeps."""
     out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """The file to write, .npz."""
     model: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_MODEL
@@ -37,36 +39,58 @@ class SynthesizeOptions:
 
 
 def run(options: SynthesizeOptions) -> None:
-    """Synthesise and write. Raises `TakeError`, `MeshError` and `BundleError`."""
+    """Synthesise and write. Raises `TakeError`, `MeshError`, `BundleError` and `OSError`."""
     if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
         raise TakeError(f"look-ahead {options.look_ahead} s is outside 0 to {MAX_LOOK_AHEAD_S}")
-    take = read_take(options.take)
-    shapes = read_shapes(options.mesh, take)
-    synthesizer = Synthesizer(load_bundle(options.model))
-    ticks = tick_take(take, options.look_ahead)
+    if not options.out.absolute().parent.is_dir():
+        raise TakeError(f"--out {options.out}: its folder does not exist; make it first")
     console = Console(stderr=True)
+    with console.status("loading take, meshes and model"):
+        take = read_take(options.take)
+        shapes = read_shapes(options.mesh, take, options.take)
+        synthesizer = Synthesizer(load_bundle(options.model))
+        ticks = tick_take(take, options.look_ahead)
     with Progress(console=console) as progress:
         task = progress.add_task(take.name, total=2 * len(ticks.time_s))
-        hands: dict[str, Any] = synthesise(synthesizer, ticks, shapes, lambda n: progress.advance(task, n))
+        hands = synthesise(synthesizer, ticks, shapes, lambda n: progress.advance(task, n))
     with options.out.open("wb") as file:
-        np.savez_compressed(file, time=ticks.time_s, **hands)
+        write_arrays(file, ticks, shapes, hands)
     console.print(f"wrote {options.out}: {len(ticks.time_s)} frames at 60 Hz, both hands")
 
 
-def read_shapes(meshes: tuple[str, ...], take: Take) -> dict[str, Shape]:
-    """Shapes by body from `NAME=FILE`. Raises `TakeError` for a body the take does not have, and `MeshError`."""
-    shapes = {}
-    for text in meshes:
-        name, equals, path = text.partition("=")
-        if not equals or name not in take.objects:
-            raise TakeError(f"--mesh {text}: must be NAME=FILE with NAME one of {', '.join(take.objects) or 'none'}")
-        shapes[name] = _centred(path) if take.box_centred else load_shape(path)
+def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands: dict[str, Array]) -> None:
+    """The file of `manipnet synthesize`: time, the arrays of `synthesise`, and every object's poses and mesh."""
+    objects = [name for name in ticks.bodies if not name.endswith("_wrist")]
+    arrays: dict[str, Any] = {"time": ticks.time_s, **hands, "objects": np.array(objects)}
+    arrays["object_poses"] = np.stack([ticks.bodies[name].poses for name in objects])
+    for k, name in enumerate(objects):
+        if name in shapes:
+            arrays[f"object_{k}_vertices"] = shapes[name].mesh.vertices.astype(np.float32)
+            arrays[f"object_{k}_faces"] = shapes[name].mesh.faces
+    np.savez_compressed(file, **arrays)
+
+
+def read_shapes(meshes: Sequence[str], take: Take, path: Path) -> dict[str, Shape]:
+    """Shapes by body from `NAME=FILE`, or those the recording at `path` keeps. Raises `TakeError` and `MeshError`."""
+    check_wrists(take)
+    files = named_files(meshes, take.objects)
+    if files:
+        return {name: _centred(file) if take.box_centred else load_shape(file) for name, file in files.items()}
+    kept = recorded_meshes(path) if path.suffix.lower() == ".mcap" else {}
+    shapes = {name: build_shape(mesh) for name, mesh in kept.items() if name in take.objects}
     if not shapes:
         raise TakeError(f"no --mesh: at least one of {', '.join(take.objects) or 'none'} needs one")
     return shapes
 
 
-def _centred(path: str) -> Shape:
+def check_wrists(take: Take) -> None:
+    """Raise `TakeError` unless both wrists are there."""
+    if missing := [wrist for wrist in WRISTS if wrist not in take.bodies]:
+        have = ", ".join(take.bodies) or "none"
+        raise TakeError(f"{take.name}: no body {' and no '.join(missing)}, only {have}; name the wrists' bodies so")
+
+
+def _centred(path: Path) -> Shape:
     """The shape of a mesh whose origin is moved to the centre of its bounding box."""
     mesh = load_mesh(path)
     centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))

@@ -1,0 +1,91 @@
+"""Hands and objects as BVH: the ManipNet dataset's skeleton and layout, or the same right-handed for other programs."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manipnet.geometry import Array, mirror_points, mirror_quats
+from manipnet.hand.skeleton import BONE_COUNT, JOINT_NAMES, PARENTS
+from manipnet_tools.export.performance import ExportError, HandTrack, Performance
+
+DECIMETRES_PER_M = 10.0
+CENTIMETRES_PER_M = 100.0
+_CHANNELS = "Yrotation Xrotation Zrotation"
+_ROOT_CHANNELS = f"CHANNELS 6 Xposition Yposition Zposition {_CHANNELS}"
+
+
+def write_bvh(performance: Performance, folder: Path, right_handed: bool = False) -> list[Path]:
+    """Write `leftHand.bvh`, `rightHand.bvh` and `<object>.bvh` into `folder`; returns the files.
+
+    As the dataset's own files they are left-handed decimetres, which every tool here reads; `right_handed` ones are
+    centimetres as Blender and Maya expect them, and are not read here. Raises `ExportError` where takes are already.
+    """
+    if any(folder.glob("*.bvh")):
+        raise ExportError(f"{folder}: holds BVH files already, which may be a take; give a new folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    space = _Space(CENTIMETRES_PER_M, False) if right_handed else _Space(DECIMETRES_PER_M, True)
+    texts = {f"{side}Hand": _hand_text(hand, performance.rate_hz, space) for side, hand in performance.hands.items()}
+    for name, body in performance.objects.items():
+        texts[file_stem(name)] = _object_text(file_stem(name), body.poses, performance.rate_hz, space)
+    for stem, text in texts.items():
+        (folder / f"{stem}.bvh").write_text(text, encoding="utf-8")
+    return [folder / f"{stem}.bvh" for stem in texts]
+
+
+def file_stem(name: str) -> str:
+    """A body's name as a file name and a joint name without spaces."""
+    return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
+
+
+class _Space:
+    """The units and handedness of a file."""
+
+    def __init__(self, per_m: float, mirrored: bool) -> None:
+        self._per_m, self._mirrored = per_m, mirrored
+
+    def points(self, points: Array) -> Array:
+        return self._per_m * (mirror_points(points) if self._mirrored else points)
+
+    def degrees(self, quats: Array) -> Array:
+        """Angles `(T, ..., 3)` about Y, then X, then Z, each about the axes as turned so far, without jumps."""
+        quats = mirror_quats(quats) if self._mirrored else quats
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # at the pole scipy picks one of many right answers
+            angles = Rotation.from_quat(quats.reshape(-1, 4)).as_euler("YXZ", degrees=True)
+        return np.unwrap(angles.reshape(*quats.shape[:-1], 3), period=360.0, axis=0)
+
+
+def _hand_text(hand: HandTrack, rate_hz: float, space: _Space) -> str:
+    offsets = space.points(hand.offsets)
+    columns = [space.points(hand.wrist[:, :3]), space.degrees(hand.rotations).reshape(len(hand.wrist), -1)]
+    return "\n".join(["HIERARCHY", *_joint(0, offsets, ""), *_motion(np.concatenate(columns, axis=1), rate_hz)])
+
+
+def _joint(joint: int, offsets: Array, indent: str) -> list[str]:
+    """Lines of a joint and all below it; the dataset's joints are in depth-first order, as ours are."""
+    if joint >= BONE_COUNT:
+        head, channels = f"{indent}End Site", []
+    elif joint == 0:
+        head, channels = f"ROOT {JOINT_NAMES[0]}", [f"\t{_ROOT_CHANNELS}"]
+    else:
+        head, channels = f"{indent}JOINT {JOINT_NAMES[joint]}", [f"{indent}\tCHANNELS 3 {_CHANNELS}"]
+    below = [line for child in np.flatnonzero(joint == PARENTS) for line in _joint(int(child), offsets, f"{indent}\t")]
+    return [head, f"{indent}{{", f"{indent}\tOFFSET {_numbers(offsets[joint])}", *channels, *below, f"{indent}}}"]
+
+
+def _object_text(name: str, poses: Array, rate_hz: float, space: _Space) -> str:
+    end = ["\tEnd Site", "\t{", "\t\tOFFSET 0 0 0", "\t}"]
+    columns = np.concatenate([space.points(poses[:, :3]), space.degrees(poses[:, 3:])], axis=1)
+    head = ["HIERARCHY", f"ROOT {name}", "{", "\tOFFSET 0 0 0", f"\t{_ROOT_CHANNELS}", *end, "}"]
+    return "\n".join([*head, *_motion(columns, rate_hz)])
+
+
+def _motion(columns: Array, rate_hz: float) -> list[str]:
+    rows = [_numbers(row) for row in columns]
+    return ["MOTION", f"Frames: {len(rows)}", f"Frame Time: {1.0 / rate_hz:.9f}", *rows, ""]
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(f"{value:.6f}" for value in values.tolist())

@@ -1,0 +1,46 @@
+"""Hands and objects as one table: a row per frame, a named column per number; `docs/export.md` lists the columns."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from manipnet.geometry import Array, mirror_quats, quat_conjugate, quat_multiply, quat_to_matrix
+from manipnet.hand.kinematics import angles_from_rotations
+from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from manipnet.synthesis import Side
+from manipnet_tools.export.performance import HandTrack, Performance
+
+_POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+
+
+def write_csv(performance: Performance, path: Path) -> None:
+    """Write the table; right-handed, Y up, metres, radians, seconds. Raises `OSError`."""
+    columns: dict[str, Array] = {"time_s": performance.time_s}
+    for side, hand in performance.hands.items():
+        columns |= _hand_columns(side, hand)
+    for name, body in performance.objects.items():
+        columns |= {f"{name}_{part}": body.poses[:, k] for k, part in enumerate(_POSE)}
+        columns[f"{name}_tracked"] = body.tracked.astype(np.float64)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["frame", *columns])
+        table = np.column_stack(list(columns.values())).tolist()
+        writer.writerows([k, *(f"{value:.8g}" for value in row)] for k, row in enumerate(table))
+
+
+def _hand_columns(side: Side, hand: HandTrack) -> dict[str, Array]:
+    positions, rotations = hand.world()
+    columns = {f"{side}_live": hand.live.astype(np.float64)}
+    columns |= {f"{side}_wrist_{part}": hand.wrist[:, 3 + k] for k, part in enumerate(_POSE[3:])}
+    angles = hand_angles(side, rotations)
+    columns |= {f"{side}_{name.lower()}_rad": angles[:, k] for k, name in enumerate(DOF_NAMES)}
+    for joint, name in enumerate(JOINT_NAMES):
+        columns |= {f"{side}_{name.lower()}_{axis}": positions[:, joint, k] for k, axis in enumerate("xyz")}
+    return columns
+
+
+def hand_angles(side: Side, rotations: Array) -> Array:
+    """The 20 angles `(T, 20)` nearest to bone rotations `(T, 17, 4)` in the world."""
+    quats = quat_multiply(quat_conjugate(rotations[:, :1]), rotations)
+    return angles_from_rotations(quat_to_matrix(mirror_quats(quats) if side == "left" else quats))

@@ -1,0 +1,181 @@
+"""Hands and objects as glTF 2.0: both hands as skinned meshes with their skeletons, objects, and one animation.
+
+Right-handed, Y up, metres, as glTF wants it. Time starts at the first frame. The skin is `manipnet.hand.surface`.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manipnet import __version__
+from manipnet.geometry import MIRROR, Array, mirror_points
+from manipnet.hand.bind import BIND_ANGLES_RAD
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.hand.skeleton import BONE_COUNT, JOINT_COUNT, JOINT_NAMES, PARENTS
+from manipnet.hand.surface import BONES, FACES, VERTICES, WEIGHTS
+from manipnet.objects.mesh import ClosedMesh
+from manipnet.streams.wire import Side
+from manipnet_tools.export.glb import ATTRIBUTE, INDEX, Buffer
+from manipnet_tools.export.performance import HandTrack, Performance
+from manipnet_tools.render import CERAMIC, SKIN_LEFT, SKIN_RIGHT, corner_normals
+
+_COLOURS: Mapping[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right": SKIN_RIGHT}
+
+
+def write_gltf(performance: Performance, path: Path) -> None:
+    """Write `.glb` or `.gltf`. Raises `OSError`."""
+    scene = _Scene(performance)
+    for side, hand in performance.hands.items():
+        scene.add_hand(side, hand)
+    for name, body in performance.objects.items():
+        scene.add_object(name, body.poses, performance.meshes.get(name))
+    scene.save(path)
+
+
+class _Scene:
+    """A document that grows node by node."""
+
+    def __init__(self, performance: Performance) -> None:
+        self._buffer = Buffer()
+        self._document: dict[str, list[Any]] = {"nodes": [], "meshes": [], "materials": []}
+        self._skins: list[Any] = []
+        self._roots: list[int] = []
+        self._channels: list[dict[str, Any]] = []
+        self._samplers: list[dict[str, Any]] = []
+        self._name = performance.name
+        time_s = (performance.time_s - performance.time_s[0]).astype(np.float32)
+        self._times = self._buffer.add(time_s, bounds=True)
+
+    def add_hand(self, side: Side, hand: HandTrack) -> None:
+        """A skeleton of 22 joints, tips included, and the skin that follows it."""
+        first = len(self._document["nodes"])
+        for joint, name in enumerate(JOINT_NAMES):
+            children = [first + int(child) for child in np.flatnonzero(joint == PARENTS)]
+            node = self._node(f"{side}_{name}", hand.offsets[joint], None, children)
+            if joint == 0:
+                self._animate(node, hand.wrist[:, :3], hand.wrist[:, 3:])
+            elif joint < BONE_COUNT:
+                self._animate(node, None, hand.rotations[:, joint])
+        mesh, bind = self._skin_mesh(side, hand.scale)
+        skin = {"joints": list(range(first, first + JOINT_COUNT)), "skeleton": first, "inverseBindMatrices": bind}
+        self._skins.append(skin | {"name": f"{side}_hand"})
+        body = self._node(f"{side}_hand", None, mesh, [])
+        self._document["nodes"][body]["skin"] = len(self._skins) - 1
+        self._roots += [first, body]
+
+    def add_object(self, name: str, poses: Array, mesh: ClosedMesh | None) -> None:
+        """A moving mesh, or a bare node where the shape is not known."""
+        index = None
+        if mesh is not None:
+            vertices, normals, faces = split_creases(mesh.vertices, mesh.faces)
+            index = self._mesh(name, vertices, normals, faces, CERAMIC, {})
+        node = self._node(name, None, index, [])
+        self._animate(node, poses[:, :3], poses[:, 3:])
+        self._roots.append(node)
+
+    def save(self, path: Path) -> None:
+        """Write the document."""
+        optional = {key: value for key, value in (self._document | {"skins": self._skins}).items() if value}
+        animation = {"name": self._name, "channels": self._channels, "samplers": self._samplers}
+        asset = {"version": "2.0", "generator": f"ManipNet Live {__version__}"}
+        scenes = [{"name": self._name, "nodes": self._roots}]
+        self._buffer.save(path, {"asset": asset, "scene": 0, "scenes": scenes, "animations": [animation], **optional})
+
+    def _node(self, name: str, offset: Array | None, mesh: int | None, children: list[int]) -> int:
+        node: dict[str, Any] = {"name": name}
+        if offset is not None:
+            node["translation"] = offset.tolist()
+        if mesh is not None:
+            node["mesh"] = mesh
+        if children:
+            node["children"] = children
+        self._document["nodes"].append(node)
+        return len(self._document["nodes"]) - 1
+
+    def _animate(self, node: int, positions: Array | None, quats: Array) -> None:
+        """Keys for every frame; the node itself stands as in the first one."""
+        tracks = {"rotation": _continuous(quats)} | ({} if positions is None else {"translation": positions})
+        for path, values in tracks.items():
+            keys = values.astype(np.float32)
+            sampler = {"input": self._times, "output": self._buffer.add(keys), "interpolation": "LINEAR"}
+            self._samplers.append(sampler)
+            self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
+            self._document["nodes"][node][path] = keys[0].tolist()
+
+    def _skin_mesh(self, side: Side, scale: float) -> tuple[int, int]:
+        """The skin of a hand in its bind pose, and the accessor of the matrices from there to each joint."""
+        positions, rotations = forward_kinematics(BIND_ANGLES_RAD)
+        vertices, faces = scale * VERTICES, FACES
+        matrices = np.tile(np.eye(4), (JOINT_COUNT, 1, 1))
+        matrices[:, :3, :3] = rotations[np.where(np.arange(JOINT_COUNT) < BONE_COUNT, np.arange(JOINT_COUNT), PARENTS)]
+        matrices[:, :3, 3] = scale * positions
+        if side == "left":
+            vertices, faces = mirror_points(vertices), faces[:, ::-1]
+            matrices[:, :3, :3] = MIRROR @ matrices[:, :3, :3] @ MIRROR
+            matrices[:, :3, 3] = mirror_points(matrices[:, :3, 3])
+        bind = np.linalg.inv(matrices)
+        bind[:, 3] = [0.0, 0.0, 0.0, 1.0]
+        weights = _unit_sum(WEIGHTS)
+        joints = np.where(weights > 0.0, BONES, 0).astype(np.uint8)
+        attributes = {
+            "JOINTS_0": self._buffer.add(joints, ATTRIBUTE),
+            "WEIGHTS_0": self._buffer.add(weights, ATTRIBUTE),
+        }
+        normals = _vertex_normals(vertices, faces)
+        mesh = self._mesh(f"{side}_hand", vertices, normals, faces, _COLOURS[side], attributes)
+        return mesh, self._buffer.add(bind.astype(np.float32))
+
+    def _mesh(
+        self,
+        name: str,
+        vertices: Array,
+        normals: Array,
+        faces: NDArray[np.integer[Any]],
+        colour: tuple[float, float, float],
+        attributes: dict[str, int],
+    ) -> int:
+        surface = {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.65}
+        self._document["materials"].append({"name": name, "pbrMetallicRoughness": surface})
+        attributes = {
+            "POSITION": self._buffer.add(vertices.astype(np.float32), ATTRIBUTE, bounds=True),
+            "NORMAL": self._buffer.add(normals.astype(np.float32), ATTRIBUTE),
+            **attributes,
+        }
+        indices = faces.reshape(-1).astype(np.uint16 if len(vertices) < 65_535 else np.uint32)
+        primitive = {"attributes": attributes, "indices": self._buffer.add(indices, INDEX)}
+        material = {"material": len(self._document["materials"]) - 1}
+        self._document["meshes"].append({"name": name, "primitives": [primitive | material]})
+        return len(self._document["meshes"]) - 1
+
+
+def split_creases(vertices: Array, faces: NDArray[np.integer[Any]]) -> tuple[Array, Array, NDArray[np.integer[Any]]]:
+    """Vertices, unit normals and faces with a vertex for every side of a sharp edge, so that it looks sharp."""
+    normals = corner_normals(vertices, faces.astype(np.int64)).reshape(-1, 3)
+    corners = np.concatenate([faces.reshape(-1, 1), np.round(normals * 1e4)], axis=1)
+    _, first, corner = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    return vertices[faces.reshape(-1)[first]], normals[first], corner.reshape(-1, 3)
+
+
+def _vertex_normals(vertices: Array, faces: NDArray[np.integer[Any]]) -> Array:
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    normals = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(normals, faces[:, corner], np.cross(b - a, c - a))
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def _unit_sum(weights: Array) -> NDArray[np.float32]:
+    """Weights `(V, 4)` that sum to one in single precision, the greatest first."""
+    rounded = weights.astype(np.float32)
+    rounded[:, 0] = np.float32(1.0) - rounded[:, 1:].sum(axis=1, dtype=np.float32)
+    return rounded
+
+
+def _continuous(quats: Array) -> Array:
+    """Quaternions `(T, 4)` of which each is on the side of the one before: no blending the long way round."""
+    flips = np.sign(np.sum(quats[1:] * quats[:-1], axis=1))
+    signs = np.cumprod(np.concatenate([[1.0], np.where(flips == 0.0, 1.0, flips)]))
+    return quats * signs[:, None]

@@ -1,0 +1,36 @@
+"""Meshes of a take's objects: those named on the command line, and those a recording keeps."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from manipnet.objects.mesh import ClosedMesh, MeshError, load_mesh
+from manipnet.recording import read_about
+from manipnet_tools.takes import TakeError
+
+
+def named_files(texts: Sequence[str], names: Iterable[str]) -> dict[str, Path]:
+    """Files by object from `NAME=FILE`, NAME one of `names`. Raises `TakeError`."""
+    names = tuple(names)
+    files = {}
+    for text in texts:
+        name, equals, file = text.partition("=")
+        if not equals or name not in names:
+            raise TakeError(f"--mesh {text}: must be NAME=FILE with NAME one of {', '.join(names) or 'none'}")
+        files[name] = Path(file)
+    return files
+
+
+def recorded_meshes(recording: Path) -> dict[str, ClosedMesh]:
+    """The meshes a recording keeps, by object. Raises `RecordingError`, and `MeshError` for a damaged one."""
+    meshes = {}
+    with TemporaryDirectory() as folder:
+        for name, content in read_about(recording).meshes.items():
+            file = Path(folder) / name
+            file.write_bytes(content)
+            try:
+                meshes[file.stem] = load_mesh(file)
+            except MeshError as error:
+                reason = str(error).removeprefix(f"{file}: ")
+                raise MeshError(f"{recording}: its mesh {name}: {reason}; give --mesh {file.stem}=FILE") from None
+    return meshes
