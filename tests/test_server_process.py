@@ -22,7 +22,7 @@ CUBE = LIBRARY_FOLDER / "cube.ply"
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals for another process")
 def test_ready_names_every_address_and_a_signal_ends_it_with_status_0(tiny_bundle: Path, how: int) -> None:
     with serving("--model", str(tiny_bundle), "--metrics-port", "0") as server:
-        assert list(server.addresses) == ["hands", "bodies", "control", "osc", "web", "metrics"]
+        assert list(server.addresses) == ["hands", "bodies", "control", "osc", "page", "web", "metrics"]
         with urllib.request.urlopen(server.addresses["metrics"], timeout=20.0) as response:
             text = response.read().decode()
         assert 'manipnet_frames_in_total{source="zmq"} 0.0' in text
@@ -36,7 +36,7 @@ def test_the_second_line_says_what_is_going_on(tiny_bundle: Path) -> None:
         assert server.line().startswith("waiting for bodies")
 
 
-@pytest.mark.parametrize("option", ["--port", "--input-port", "--control-port", "--osc-port", "--web-port"])
+@pytest.mark.parametrize("option", ["--port", "--input-port", "--control-port", "--osc-port", "--page-port", "--web-port"])
 def test_a_port_in_use_is_named_with_its_option(
     tiny_bundle: Path, capsys: pytest.CaptureFixture[str], option: str
 ) -> None:

@@ -17,6 +17,7 @@ from manipnet.flight_recorder import FlightRecorder
 from manipnet.mailbox import Mailbox
 from manipnet.metrics import MetricsPage
 from manipnet.network.bundle import load_bundle
+from manipnet.page.host import LivePage
 from manipnet.props import Wardrobe
 from manipnet.publisher import Publisher
 from manipnet.requests import Requests
@@ -95,11 +96,16 @@ class Server:
         control = Control(config.host, config.control_port, self._requests().handlers(), counters, self._keys)
         opened.callback(control.stop)
         control.start()
+        page_host = LOOPBACK if self._keys is not None else config.host  # browsers have no keys
+        page = LivePage(page_host, config.page_port, control.answer, counters)
+        opened.callback(page.stop)
+        page.start()
         addresses = {
             "hands": publisher.addresses["hands"],
             "bodies": self._listen(opened, "--input-port", self._zmq_bodies()),
             "control": control.address,
             "osc": self._listen(opened, "--osc-port", self._osc_bodies()),
+            "page": page.address,
             "web": publisher.addresses["web"],
         }
         if config.natnet is not None:
@@ -108,9 +114,9 @@ class Server:
             metrics = MetricsPage(LOOPBACK, config.metrics_port, counters, self.timings)
             opened.callback(metrics.close)
             addresses["metrics"] = metrics.address
-        return self._loop(publisher), addresses
+        return self._loop(publisher, page), addresses
 
-    def _loop(self, publisher: Publisher) -> TickLoop:
+    def _loop(self, publisher: Publisher, page: LivePage) -> TickLoop:
         stages = StageClock(self.timings)
         return TickLoop(
             self.session,
@@ -122,6 +128,7 @@ class Server:
             FlightRecorder(self._config.dump_dir or user_log_path("manipnet", appauthor=False)),
             self.counters,
             self.timings,
+            page,
         )
 
     def _requests(self) -> Requests:

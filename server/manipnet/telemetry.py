@@ -48,13 +48,15 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "frames_dropped": ("reason", DROP_REASONS),
     "bodies_rejected": ("reason", BODY_REASONS),
     "sender_restarts": ("source", SOURCES),
-    "connections_refused": ("reason", ("handshake", "not_listed")),
+    "connections_refused": ("reason", ("handshake", "not_listed", "too_many", "endless")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
     "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "web")),
     "control_requests": ("op", CONTROL_OPS),
+    "page_frames": ("fate", ("shown", "skipped")),
+    "page_ended": ("reason", ("crash",)),
 }
 """Every counter with its one label and the values that label may take."""
 

@@ -3,7 +3,8 @@ publishes. It is the only thread that touches the actors, and it never waits for
 
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
 
 from manipnet.actor import Actor, Plan, ShownHand
 from manipnet.flight_recorder import FlightRecorder
@@ -25,6 +26,17 @@ _BEST_FIRST = (_TAKEN, "duplicate", "other_sender", "time_jump", "internal", "un
 """What became of a frame that several actors looked at: the best of what each made of it."""
 
 
+class Onlooker(Protocol):
+    """Whoever wants to see more of a tick than its message, while `watched`; `see` must return at once."""
+
+    @property
+    def watched(self) -> bool: ...
+
+    def see(
+        self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
+    ) -> None: ...
+
+
 class TickLoop:
     """Steps and publishes the hands of several actors."""
 
@@ -39,8 +51,10 @@ class TickLoop:
         recorder: FlightRecorder,
         counters: Counters,
         timings: Timings,
+        onlooker: Onlooker | None = None,
     ) -> None:
         self.actors = actors
+        self._onlooker = onlooker
         self._session, self._publish, self._mailbox = session, publish, mailbox
         self._recorder, self._counters, self._timings = recorder, counters, timings
         self._synthesizer, self._stages = synthesizer, stages
@@ -80,7 +94,11 @@ class TickLoop:
         plans = [(actor, tick, self._plan(actor, tick)) for actor, tick in ticks if tick is not None]
         steps = self._synthesise([plan for _, _, plan in plans if plan is not None])
         for actor, tick, plan in plans:
-            self._publish_hands(actor, tick, self._hands(actor, tick, plan, steps))
+            own = {} if plan is None else dict(zip(plan.scenes, steps, strict=False))
+            del steps[: len(own)]
+            message = self._publish_hands(actor, tick, self._hands(actor, tick, plan, own))
+            if message is not None and self._onlooker is not None and self._onlooker.watched:
+                self._onlooker.see(actor, tick, plan, own, message)
         return bool(plans)
 
     def _compare(self, frame: BodyFrame) -> str:
@@ -128,29 +146,32 @@ class TickLoop:
             self._failed("synthesis", error, [plan.tick for plan in plans])
             return []
 
-    def _hands(self, actor: Actor, tick: Tick, plan: Plan | None, steps: list[HandStep]) -> dict[Side, ShownHand]:
-        """What the actor shows; takes its steps from the front of `steps`. On any error the last good pose."""
+    def _hands(
+        self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep]
+    ) -> dict[Side, ShownHand]:
+        """What the actor shows. On any error the last good pose."""
         if plan is None:
             return actor.hold(tick)
-        own = dict(zip(plan.scenes, steps, strict=False))
-        del steps[: len(own)]
         try:
-            return actor.show(plan, own)
+            return actor.show(plan, steps)
         except Exception as error:
             self._failed("show", error, [tick])
             return actor.hold(tick)
 
-    def _publish_hands(self, actor: Actor, tick: Tick, hands: dict[Side, ShownHand]) -> None:
+    def _publish_hands(self, actor: Actor, tick: Tick, hands: dict[Side, ShownHand]) -> HandsMessage | None:
         for hand in hands.values():
             self._counters.add("hand_ticks", state=hand.shown.state)
         now_s = time.monotonic()
         waited_s, spent_s = tick.look_ahead_s, now_s - tick.waited_for_s
         latency = Latency(buffer=1e3 * waited_s, total=1e3 * (waited_s + spent_s), **self._stages.last_ms)
+        message = None
         try:
-            self._publish(hands_message(self._session, actor, tick, hands, now_s, latency))
+            message = hands_message(self._session, actor, tick, hands, now_s, latency)
+            self._publish(message)
         except Exception as error:
             self._failed("publish", error, [tick])
         self._record(actor, now_s, tick.waited_for_s)
+        return message
 
     def _record(self, actor: Actor, started_s: float, waited_for_s: float) -> None:
         now_s = time.monotonic()

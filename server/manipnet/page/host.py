@@ -12,14 +12,18 @@ import selectors
 import socket
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, Final
 
+from manipnet.actor import Actor, Plan
 from manipnet.objects.shape import Shape
-from manipnet.page.frames import Frame, ShapeView
+from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.streams.intake import ListenError
+from manipnet.streams.wire import HandsMessage
+from manipnet.synthesis import HandStep, Side
 from manipnet.telemetry import Counters
+from manipnet.timeline import Tick
 
 FRAMES_HZ: Final = 30.0
 """As many ticks a second go to the page; the newest ones."""
@@ -35,7 +39,7 @@ Answer = Callable[[list[bytes]], bytes]
 
 
 class LivePage:
-    """Listens from construction to `stop`, serves from `start`. `show` belongs to the tick thread."""
+    """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
 
     def __init__(self, host: str, port: int, answer: Answer, counters: Counters) -> None:
         """Raises `ListenError`. `answer` meets the page's requests, as it does any client's."""
@@ -43,10 +47,10 @@ class LivePage:
         self.address = _url(host, self._listener.getsockname()[1])
         self._answer, self._counters = answer, counters
         self.watched = False
-        """Whether a browser is open: only then there is anything to `show`."""
+        """Whether a browser is open: only then is there anything to `see`."""
         self._news, self._telling = threading.Condition(), threading.Lock()
         self._newest: dict[str, tuple[Frame, Sequence[Shape]]] = {}
-        self._stopping = False
+        self._stopping = threading.Event()
         self._wake, self._woken = socket.socketpair()
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
 
@@ -54,17 +58,22 @@ class LivePage:
         """Begin to serve."""
         self._thread.start()
 
-    def show(self, frame: Frame, shapes: Sequence[Shape]) -> None:
-        """Offer a tick and the shapes of its props; returns at once. A tick nobody took makes room for the next."""
+    def see(
+        self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
+    ) -> None:
+        """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
+        props = tuple(PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale) for prop in actor.props)
+        windows = {name: body.window for name, body in tick.bodies.items()}
+        frame = Frame(message, props, windows, {} if plan is None else _hands(actor, plan, steps))
         with self._news:
-            if frame.message.actor in self._newest:
+            if message.actor in self._newest:
                 self._counters.add("page_frames", fate="skipped")
-            self._newest[frame.message.actor] = frame, shapes
+            self._newest[message.actor] = frame, [prop.shape for prop in actor.props]
             self._news.notify()
 
     def stop(self) -> None:
         """End the page and free the port."""
-        self._stopping = True
+        self._stopping.set()
         self._wake.send(b"x")
         if self._thread.is_alive():
             self._thread.join()
@@ -79,14 +88,12 @@ class LivePage:
                 self._serve()
             except Exception as error:  # whatever it is, the session goes on without a page
                 _log.error("the page: %s: %s", type(error).__name__, error)
-            if self._stopping:
+            if self._stopping.is_set():
                 return
             self._counters.add("page_ended", reason="crash")
             _log.error("the page's process has ended; the session goes on, and a visit starts the page again")
             pause_s = RESTART_S[0] if time.monotonic() - begin_s > LASTED_S else min(2.0 * pause_s, RESTART_S[1])
-            self._woken.settimeout(pause_s)
-            with contextlib.suppress(TimeoutError):
-                self._woken.recv(1)
+            self._stopping.wait(pause_s)
 
     def _visited(self) -> bool:
         """Wait for a browser; False when the server stops."""
@@ -94,13 +101,13 @@ class LivePage:
             selector.register(self._listener, selectors.EVENT_READ)
             selector.register(self._woken, selectors.EVENT_READ)
             selector.select()
-        return not self._stopping
+        return not self._stopping.is_set()
 
     def _serve(self) -> None:
         """One life of the page's process."""
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=_page, args=(self._listener, theirs, self.address), name="page", daemon=True)
+        process = context.Process(target=_page, args=(self._listener, theirs), name="page", daemon=True)
         process.start()
         theirs.close()
         sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
@@ -121,7 +128,7 @@ class LivePage:
 
     def _listen_to(self, ours: Connection) -> None:
         """Until the process or the server ends: who watches, what is asked, what is worth a line in the log."""
-        while not self._stopping:
+        while not self._stopping.is_set():
             try:
                 if not ours.poll(POLL_S):
                     continue
@@ -161,10 +168,19 @@ class LivePage:
             ours.send(message)
 
 
-def _page(listener: socket.socket, connection: Connection, address: str) -> None:
+def _hands(actor: Actor, plan: Plan, steps: Mapping[Side, HandStep]) -> dict[Side, HandView]:
+    hands: dict[Side, HandView] = {}
+    for side, step in steps.items():
+        before, prop = plan.memories[side], actor.hands[side].prop
+        if prop is not None:
+            hands[side] = HandView(prop, before.positions, before.rotations, step.distances, step.raw_positions)
+    return hands
+
+
+def _page(listener: socket.socket, connection: Connection) -> None:
     from manipnet.page.process import serve  # what it needs is of no use to the server itself
 
-    serve(listener, connection, address)
+    serve(listener, connection)
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -5,6 +5,7 @@ from typing import Final
 import numpy as np
 import trimesh
 import viser
+from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet.page.frames import Frame, PropView, ShapeView
@@ -73,8 +74,8 @@ class HandLayers:
         if senses is None:
             return
         if "ambient" in shown:
-            self._ambient.batched_positions = senses.cells.astype(np.float32)
-            self._ambient.batched_scales = (0.9 * np.cbrt(np.clip(senses.ambient, 0.0, 1.0))).astype(np.float32)
+            self._ambient.batched_positions = _f32(senses.cells)
+            self._ambient.batched_scales = _f32(0.9 * np.cbrt(np.clip(senses.ambient, 0.0, 1.0)))
         if "proximity" in shown:
             self._show_proximity(senses)
         if "contacts" in shown:
@@ -82,18 +83,18 @@ class HandLayers:
             near = np.abs(senses.readings) < CONTACT_M
             self._touches.visible = bool(near.any())
             if near.any():
-                self._touches.points = np.where(near[:, None], senses.points, senses.points[near][0])
+                self._touches.points = _f32(np.where(near[:, None], senses.points, senses.points[near][0]))
         if "targets" in shown:
-            self._raw.points, self._targets.points = senses.raw, senses.targets
-            self._aims.points = np.stack([senses.raw, senses.targets], axis=1)
+            self._raw.points, self._targets.points = _f32(senses.raw), _f32(senses.targets)
+            self._aims.points = _f32(np.stack([senses.raw, senses.targets], axis=1))
 
     def _show_proximity(self, senses: Senses) -> None:
         nearness = 1.0 - np.clip(np.abs(senses.readings) / SENSOR_RANGE_M, 0.0, 1.0)[:, None]
         colors = np.round(FAR + nearness * (NEAR - FAR)).astype(np.uint8)
         hit = (senses.readings < SENSOR_RANGE_M)[:, None]
         ends = senses.points + np.where(hit, senses.readings[:, None], 0.0) * senses.normals
-        self._points.points, self._points.colors = senses.points, colors
-        self._rays.points = np.stack([senses.points, ends], axis=1)
+        self._points.points, self._points.colors = _f32(senses.points), colors
+        self._rays.points = _f32(np.stack([senses.points, ends], axis=1))
         self._rays.colors = np.repeat(colors[:, None], 2, axis=1)
 
 
@@ -125,7 +126,7 @@ class Ghost:
 
     def _path(self, name: str, window: Array) -> viser.LineSegmentsHandle:
         future = window[len(window) // 2 :, :3]
-        segments = np.stack([future[:-1], future[1:]], axis=1)
+        segments = _f32(np.stack([future[:-1], future[1:]], axis=1))
         if name not in self._paths:
             self._paths[name] = self._scene.add_line_segments(
                 f"{self._name}/path/{name}", segments, PATH_COLOR, thickness=2.0
@@ -163,7 +164,19 @@ class ActorLayers:
         return self._senser.sense(frame, side, shapes[prop.content_hash], prop.scale)
 
 
+def _f32(values: np.ndarray) -> NDArray[np.float32]:
+    return values.astype(np.float32)
+
+
 def _points(
     scene: viser.SceneApi, name: str, count: int, size_m: float, color: tuple[int, int, int] = (255, 255, 255)
 ) -> viser.PointCloudHandle:
-    return scene.add_point_cloud(name, np.zeros((count, 3)), color, point_size=size_m, point_shape="circle", point_shading="flat", precision="float32")
+    return scene.add_point_cloud(
+        name,
+        np.zeros((count, 3)),
+        color,
+        point_size=size_m,
+        point_shape="circle",
+        point_shading="flat",
+        precision="float32",
+    )

@@ -26,7 +26,7 @@ class Senses:
     and `readings (104,)` in metres; joints before `raw (22, 3)` and `targets (22, 3)` of inverse kinematics."""
 
     cells: Array
-    ambient: Array
+    ambient: np.ndarray
     points: Array
     normals: Array
     readings: Array

@@ -15,6 +15,8 @@ VIEW: Final = np.array([0.22, 0.50, 0.85])
 VIEW_M: Final = 0.86
 SIDEWAYS_M: Final = 0.11
 """Cameras look this far to the right of the middle: there the controls cover the picture."""
+KEY_M, RIM_M = np.array([0.35, 1.4, 0.55]), np.array([-0.8, 0.6, -0.9])
+"""From the hands to the lights."""
 FIELD_OF_VIEW_RAD: Final = 0.70
 
 
@@ -52,8 +54,8 @@ class Stage:
             wxyz=(np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),  # viser's cylinders stand along z
             cast_shadow=False,
         )
-        self._key.position = tuple(self._center + [0.35, 1.4, 0.55])
-        self._rim.position = tuple(self._center + [-0.8, 0.6, -0.9])
+        self._key.position = tuple(self._center + KEY_M)
+        self._rim.position = tuple(self._center + RIM_M)
 
     def lower(self, floor_m: float) -> None:
         """See that the table is not above `floor_m`."""

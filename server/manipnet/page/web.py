@@ -2,7 +2,6 @@
 
 import contextlib
 import ipaddress
-import re
 import socket
 from collections.abc import Iterator
 from contextvars import ContextVar

@@ -1,0 +1,105 @@
+"""The tab in which props are chosen, sized, placed and brought in."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import viser
+
+from manipnet.geometry import quat_exp, quat_log
+from manipnet.objects.mesh import FORMATS, UNITS_M
+
+if TYPE_CHECKING:
+    from manipnet.page.process import Page
+
+NONES: Final[tuple[str, ...]] = ("none",)
+Doing = Callable[[Callable[[], str | None]], None]
+
+
+class ObjectsTab:
+    """Which body carries what, how large, and where on it."""
+
+    def __init__(self, page: "Page", gui: viser.GuiApi, doing: Doing) -> None:
+        self._page, self._doing = page, doing
+        self._carried: dict[str, dict[str, Any]] = {}
+        self._body = gui.add_dropdown("Body", NONES)
+        self._object = gui.add_dropdown("Carries", NONES)
+        self._scale = gui.add_slider("Size", 0.2, 3.0, 0.05, initial_value=1.0)
+        self._position = gui.add_vector3("Moved, mm", (0.0, 0.0, 0.0), step=1.0)
+        self._turn = gui.add_vector3("Turned, °", (0.0, 0.0, 0.0), step=1.0)
+        self._unit = gui.add_dropdown("Unit of a file", tuple(UNITS_M), initial_value="m")
+        self._upload = gui.add_upload_button(
+            "Bring in a mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
+        )
+        self._body.on_update(self._by_visitor(self._show_body))
+        for handle in (self._object, self._scale):
+            handle.on_update(self._by_visitor(lambda: self._doing(self._select)))
+        for handle in (self._position, self._turn):
+            handle.on_update(self._by_visitor(lambda: self._doing(self._place)))
+        self._upload.on_upload(lambda _: self._doing(self._bring_in))
+
+    def refresh(self) -> None:
+        """Offer what there is now."""
+        answer = self._page.link.ask(op="objects")
+        self._carried = {
+            body if len(answer["bodies"]) == 1 else f"{actor}: {body}": {"actor": actor, "body": body, **prop}
+            for actor, props in answer["bodies"].items()
+            for body, prop in props.items()
+        }
+        objects = tuple(answer["objects"])
+        if self._object.options != objects:
+            self._object.options = objects
+        bodies = tuple(self._carried) or NONES
+        if self._body.options != bodies:
+            self._body.options = bodies
+            self._show_body()
+
+    def _show_body(self) -> None:
+        prop = self._carried.get(self._body.value)
+        if prop is None:
+            return
+        if prop["object"] in self._object.options:
+            self._object.value = prop["object"]
+        self._scale.value = min(max(prop["scale"], self._scale.min), self._scale.max)
+        self._position.value = np.round(1e3 * np.array(prop.get("position", (0.0, 0.0, 0.0))), 2)
+        turn = np.degrees(quat_log(np.array(prop.get("rotation", (0.0, 0.0, 0.0, 1.0)))))
+        self._turn.value = np.round(turn, 2)
+
+    def _chosen(self) -> dict[str, Any]:
+        prop = self._carried.get(self._body.value)
+        if prop is None:
+            raise ValueError("no body carries anything yet; name one in the rig file, or start with --mesh NAME=FILE")
+        return {"actor": prop["actor"], "body": prop["body"]}
+
+    def _select(self) -> None:
+        self._page.link.ask(op="select_object", object=self._object.value, scale=self._scale.value, **self._chosen())
+
+    def _place(self) -> None:
+        rotation = quat_exp(np.radians(self._turn.value)).tolist()
+        position = [1e-3 * x for x in self._position.value]
+        self._page.link.ask(op="place_object", position=position, rotation=rotation, **self._chosen())
+
+    def _bring_in(self) -> str:
+        file = self._upload.value
+        return self.bring_in(file.name, file.content)
+
+    def bring_in(self, name: str, content: bytes) -> str:
+        """Let the chosen body carry the mesh of a file from now on. Raises `RefusedError`."""
+        chosen = self._chosen()
+        with tempfile.TemporaryDirectory(prefix="manipnet-") as folder:
+            path = Path(folder) / Path(name).name
+            path.write_bytes(content)
+            added = self._page.link.ask(op="add_object", file=str(path), unit=self._unit.value)
+        self._page.link.ask(op="select_object", object=added["object"], scale=1.0, **chosen)
+        return f"{chosen['body']} carries {added['object']}"
+
+    def _by_visitor(self, action: Callable[[], None]) -> Callable[[viser.GuiEvent[Any]], None]:
+        """Only what a visitor did, not what is set here."""
+
+        def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                action()
+
+        return changed

@@ -1,0 +1,64 @@
+"""Recordings on the page: the hands of an MCAP file as frames, at any instant."""
+
+import json
+import tempfile
+from bisect import bisect_left
+from dataclasses import dataclass
+from pathlib import Path
+
+from manipnet.objects.library import library_names, load_library_mesh
+from manipnet.objects.mesh import ClosedMesh, MeshError, load_mesh
+from manipnet.page.frames import Frame, PropView, ShapeView
+from manipnet.recording import About, RecordingError, read_about, read_hands
+from manipnet.streams.wire import HandsMessage
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a file holds for the eye: the hands of its first actor, and the shapes of its props by hash."""
+
+    name: str
+    messages: tuple[HandsMessage, ...]
+    props: tuple[PropView, ...]
+    shapes: dict[str, ShapeView]
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return self.messages[-1].t_capture - self.messages[0].t_capture
+
+    def at(self, second: float) -> Frame:
+        """The tick at or after a second from the begin, as the page shows it; what hands sensed is in no recording."""
+        begin_s = self.messages[0].t_capture
+        index = bisect_left(self.messages, begin_s + second, key=lambda message: message.t_capture)
+        return Frame(self.messages[min(index, len(self.messages) - 1)], self.props, {}, {})
+
+
+def read_recording(path: Path) -> Recording:
+    """Read a recording. Raises `RecordingError`, also for one without hands."""
+    messages = list(read_hands(path))
+    if not messages:
+        raise RecordingError(f"{path.name}: holds no hands; it is the tracker's bodies alone (`manipnet replay` it)")
+    messages = tuple(message for message in messages if message.actor == messages[0].actor)
+    props, shapes = [], {}
+    for name, (mesh, scale) in _meshes(read_about(path)).items():
+        shapes[mesh.content_hash] = ShapeView(mesh.name, mesh.content_hash, mesh.vertices, mesh.faces)
+        props.append(PropView(name, mesh.name, mesh.content_hash, scale))
+    return Recording(path.name, messages, tuple(props), shapes)
+
+
+def _meshes(about: About) -> dict[str, tuple[ClosedMesh, float]]:
+    """Mesh and its size by body; one that cannot be read is not shown."""
+    meshes: dict[str, tuple[ClosedMesh, float]] = {}
+    for body, carried in json.loads(about.metadata.get("objects", "{}")).items():
+        if carried.get("object") in library_names():
+            meshes[body] = load_library_mesh(carried["object"]), float(carried.get("scale", 1.0))
+    with tempfile.TemporaryDirectory() as folder:
+        for name, content in about.meshes.items():
+            path = Path(folder) / Path(name).name
+            path.write_bytes(content)
+            try:
+                meshes[path.stem] = load_mesh(path), 1.0
+            except MeshError:
+                continue
+    return meshes

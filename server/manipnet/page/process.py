@@ -1,0 +1,177 @@
+"""The page's own process: from what the server hands over to what browsers show, and back."""
+
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from multiprocessing.connection import Connection
+from typing import Final
+
+import numpy as np
+import viser
+
+from manipnet.geometry import Array
+from manipnet.page.frames import Frame, ShapeView
+from manipnet.page.hands import HandModel
+from manipnet.page.layers import ActorLayers
+from manipnet.page.link import Link, LinkLog
+from manipnet.page.panel import Panel
+from manipnet.page.playback import Recording
+from manipnet.page.plots import History
+from manipnet.page.props import PropModels, lowest_m
+from manipnet.page.stage import Stage
+from manipnet.page.web import OPERATOR, open_server
+from manipnet.streams.wire import Side
+
+REFRESH_S: Final = 0.5
+FLOOR_EVERY: Final = 15
+"""Frames between two looks at what is lowest."""
+
+
+def serve(listener: socket.socket, connection: Connection) -> None:
+    """Serve the page until the server ends, whatever way it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the server, which then ends this
+    sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (viser greets there; it belongs to the server)
+    link = Link(connection)
+    logging.basicConfig(level=logging.WARNING, handlers=[LinkLog(link)], force=True)
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # visitors that go away are no news
+    page = Page(open_server(listener, "ManipNet Live"), link)
+    threading.Thread(target=page.refresh, name="refresh", daemon=True).start()
+    page.run()
+    os._exit(0)  # browsers are still connected; nothing here is worth saving
+
+
+class ActorView:
+    """One actor in the scene."""
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._scene, self._name = scene, f"/{name}"
+        self._hands: dict[Side, HandModel] = {}
+        self._props = PropModels(scene, f"/{name}/props")
+        self._layers = ActorLayers(scene, f"/{name}/layers")
+
+    def show(self, frame: Frame, shapes: dict[str, ShapeView], layers: set[str]) -> None:
+        """One tick."""
+        hands = frame.message.hands
+        for side, hand in hands.items():
+            if side not in self._hands or self._hands[side].scale != hand.scale:
+                self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", side, hand.scale)
+            self._hands[side].pose(hand)
+        for side, model in self._hands.items():
+            model.show(side in hands)
+        self._props.show(frame.props, shapes, poses(frame), True)
+        self._layers.show(frame, shapes, layers)
+
+
+class Page:
+    """What is shown to everybody, and a panel for each visitor."""
+
+    def __init__(self, server: viser.ViserServer, link: Link) -> None:
+        self.link = link
+        self.layers = {"contacts"}
+        """Those of `layers.LAYERS` that are shown."""
+        self.histories: dict[str, History] = {}
+        """By actor."""
+        self.recording: Recording | None = None
+        """What is shown instead of what is live."""
+        self.live: dict[str, Frame] = {}
+        """The newest frame of each actor."""
+        self._server = server
+        self._stage = Stage(server.scene)
+        self._shapes: dict[str, ShapeView] = {}
+        self._views: dict[str, ActorView] = {}
+        self._drawing = threading.Lock()
+        self._drawn = 0
+        self._panels: dict[int, Panel] = {}
+        server.gui.configure_theme(
+            dark_mode=True, show_logo=False, show_share_button=False, brand_color=(88, 166, 255), control_width="medium"
+        )
+        server.on_client_connect(self._came)
+        server.on_client_disconnect(self._left)
+
+    def run(self) -> None:
+        """Show what comes until the server ends."""
+        for what, content in self.link.incoming():
+            if what == "shape":
+                self._shapes[content.content_hash] = content
+            elif what == "frame":
+                actor = content.message.actor
+                self.live[actor] = content
+                self.histories.setdefault(actor, History()).note(content.message)
+                if self.recording is None and not self.link.waiting():
+                    self.show(content)
+
+    def show(self, frame: Frame, shapes: dict[str, ShapeView] | None = None) -> None:
+        """Draw one tick."""
+        shapes = self._shapes if shapes is None else shapes
+        name = frame.message.actor
+        with self._drawing, self._server.atomic():
+            self._settle(frame, shapes)
+            if name not in self._views:
+                self._views[name] = ActorView(self._server.scene, name)
+            self._views[name].show(frame, shapes, self.layers)
+
+    def play(self, recording: Recording | None) -> None:
+        """Show a recording instead of what is live, or what is live again."""
+        with self._drawing:
+            self.recording = recording
+            self._drawn = 0
+        if recording is not None:
+            self.show(recording.at(0.0), recording.shapes)
+
+    def look(self, camera: viser.CameraHandle) -> None:
+        """Let a camera see the hands."""
+        self._stage.look(camera)
+
+    def recenter(self) -> None:
+        """Put table and cameras where the hands are now."""
+        self._drawn = 0
+
+    def refresh(self) -> None:
+        """Bring the panels up to date, again and again."""
+        while True:
+            begin_s = time.monotonic()
+            for panel in list(self._panels.values()):
+                try:
+                    panel.refresh()
+                except Exception:  # a visitor who just left, or a fault of ours: the others want to see something
+                    logging.getLogger(__name__).exception("a panel cannot be refreshed")
+            time.sleep(max(REFRESH_S - (time.monotonic() - begin_s), 0.1))
+
+    def _settle(self, frame: Frame, shapes: dict[str, ShapeView]) -> None:
+        """Keep the table below everything; at first, and when asked, put it where things are."""
+        first, self._drawn = self._drawn == 0, self._drawn + 1
+        if not first and self._drawn % FLOOR_EVERY:
+            return
+        places = poses(frame)
+        points = [hand.joints[:, :3] for hand in frame.message.hands.values()]
+        points += [places[prop.name][None, :3] for prop in frame.props if prop.name in places]
+        if not points:
+            self._drawn = 0
+            return
+        spread = np.concatenate(points)
+        floor_m = min(lowest_m(frame.props, shapes, places), float(spread[:, 1].min()))
+        if not first:
+            self._stage.lower(floor_m)
+            return
+        self._stage.place(spread, floor_m)
+        for client in self._server.get_clients().values():
+            self._stage.look(client.camera)
+
+    async def _came(self, client: viser.ClientHandle) -> None:
+        self._panels[client.client_id] = Panel(self, client, OPERATOR.get())
+        self.link.watch(True)
+        if self._stage.placed:
+            self._stage.look(client.camera)
+
+    async def _left(self, client: viser.ClientHandle) -> None:
+        self._panels.pop(client.client_id, None)
+        self.link.watch(bool(self._panels))
+
+
+def poses(frame: Frame) -> dict[str, Array]:
+    """Where the tracked bodies of a frame are, `(7,)` by name."""
+    return {body.name: body.pose for body in frame.message.bodies}

@@ -1,0 +1,99 @@
+"""The tab in which takes are recorded, picked and scrubbed."""
+
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import viser
+
+from manipnet.page.playback import read_recording
+
+if TYPE_CHECKING:
+    from manipnet.page.process import Page
+
+PLAY_HZ: Final = 30.0
+NONE: Final[str] = "none"
+Doing = Callable[[Callable[[], str | None]], None]
+
+
+class TakesTab:
+    """Record and stop; show a recording at any instant; back to what is live."""
+
+    def __init__(self, page: "Page", gui: viser.GuiApi, doing: Doing) -> None:
+        self._page, self._doing = page, doing
+        self._folder, self._recording = Path(), False
+        self._playing = threading.Event()
+        self._record = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color="red")
+        self._told = gui.add_markdown("")
+        gui.add_divider()
+        self._take = gui.add_dropdown("Take", (NONE,))
+        self._open = gui.add_button("Show this take", icon=viser.Icon.MOVIE)
+        self._scrub = gui.add_slider("Second", 0.0, 1.0, 0.01, initial_value=0.0, visible=False)
+        self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY, visible=False)
+        self._live = gui.add_button("Back to live", icon=viser.Icon.BROADCAST, visible=False)
+        self._record.on_click(lambda _: doing(self._toggle_record))
+        self._open.on_click(lambda _: doing(self._show_take))
+        self._play.on_click(lambda _: doing(self._toggle_play))
+        self._live.on_click(lambda _: doing(self._back))
+        self._scrub.on_update(self._scrubbed)
+
+    def refresh(self) -> None:
+        """Offer what there is now."""
+        answer = self._page.link.ask(op="recordings")
+        self._folder = Path(answer["folder"])
+        takes = tuple(answer["recordings"]) or (NONE,)
+        if self._take.options != takes:
+            self._take.options = takes
+        now = answer["recording"]
+        if (now is not None) != self._recording:
+            self._recording = now is not None
+            self._record.label = "Stop recording" if self._recording else "Record"
+            self._record.icon = viser.Icon.PLAYER_STOP if self._recording else viser.Icon.PLAYER_RECORD
+        self._told.content = f"🔴 **{now['name']}** · {now['seconds']:.0f} s" if now else f"into `{self._folder}`"
+
+    def _toggle_record(self) -> str | None:
+        if not self._recording:
+            self._page.link.ask(op="record")
+            return None
+        answer = self._page.link.ask(op="stop_recording")
+        return f"{answer['name']}: {answer['hands']} hands messages, {answer['bodies']} frames of bodies"
+
+    def _show_take(self) -> None:
+        if self._take.value == NONE:
+            raise ValueError("there is no recording yet; press Record")
+        recording = read_recording(self._folder / self._take.value)
+        self._playing.clear()
+        self._page.play(recording)
+        self._scrub.max, self._scrub.value = max(round(recording.seconds, 2), 0.01), 0.0
+        self._scrub.visible = self._play.visible = self._live.visible = True
+
+    def _back(self) -> None:
+        self._playing.clear()
+        self._page.play(None)
+        self._scrub.visible = self._play.visible = self._live.visible = False
+
+    def _toggle_play(self) -> None:
+        if self._playing.is_set():
+            self._playing.clear()
+        else:
+            self._playing.set()
+            threading.Thread(target=self._run, name="playback", daemon=True).start()
+        self._play.label = "Hold" if self._playing.is_set() else "Play"
+
+    def _run(self) -> None:
+        """Play from where the slider is, over and over."""
+        while self._playing.is_set():
+            self._scrub.value = (self._scrub.value + 1.0 / PLAY_HZ) % self._scrub.max
+            self._show(self._scrub.value)
+            time.sleep(1.0 / PLAY_HZ)
+
+    def _scrubbed(self, event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:
+            self._show(self._scrub.value)
+
+    def _show(self, second: float) -> None:
+        recording = self._page.recording
+        if recording is not None:
+            self._page.show(recording.at(second), recording.shapes)
