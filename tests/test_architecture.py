@@ -15,7 +15,7 @@ LAYERS = (
     ("hand", "objects"),
     ("sensing", "network", "ik"),
     ("synthesis", "body_track", "forecast", "timeline", "streams", "recording"),
-    ("presence", "output_guard", "config", "rig", "keys", "calibration"),
+    ("presence", "output_guard", "config", "rig_source", "rig", "rig_file", "keys", "calibration"),
     ("props", "actor", "page"),
     ("mailbox", "messages", "flight_recorder", "publisher", "control", "status", "metrics", "terminal", "diagnosis"),
     ("requests", "tick_loop", "doctor"),

@@ -20,6 +20,8 @@ from manipnet.config import (
     parse_endpoint,
     parse_object,
 )
+from manipnet.objects.library import library_file
+from manipnet.objects.mesh import UNITS_M
 from manipnet.rig import load_rig
 
 LEAST = """
@@ -105,6 +107,7 @@ bodies.left_wrist = "bob_left"
         (LEAST + "unit = 'furlong'\n", 10, "objects[1].unit is 'furlong'; allowed are m, dm, cm, mm, in"),
         (LEAST + "colour = 1\n", 10, "objects[1].colour is not known here"),
         (LEAST.replace("mug", "jug"), 8, "objects[1].mesh is 'jug.obj'; there is no file"),
+        (LEAST.replace("mug.obj", "jug"), 8, "and the library has bottle, bowl, cube"),
         (LEAST.replace('body = "Box"\n', ""), 6, "objects[1].body is missing"),
         ("objects = 3\n[bodies]\nleft_wrist = 1\n", 1, "objects must be tables [[objects]], not 3"),
         ("[[actors]]\nname = 3\n", 2, "actors[1].name is 3; it must be text"),
@@ -112,6 +115,14 @@ bodies.left_wrist = "bob_left"
         ("[server]\nport = 70000\n" + LEAST, 2, "server.port is 70000; allowed are 0 (any free one) … 65535"),
         ("[server]\nlook_ahead = 1\n" + LEAST, 2, "server.look_ahead is 1; allowed are 0 … 0.5 s"),
         ("[server]\nhost = 1\n" + LEAST, 2, "server.host is 1; it must be text"),
+        ("[server]\nobjects_unit = 'yd'\n" + LEAST, 2, "server.objects_unit is 'yd'; allowed are m, dm, cm, mm, in"),
+        ("limits_deg.INDEX = [0, 9]\n" + LEAST, 1, "limits_deg.INDEX is not known here; allowed are THUMB_CMC_FE, "),
+        (
+            "limits_deg.INDEX_PIP_FE = [9, 0]\n" + LEAST,
+            1,
+            "is [9, 0]; allowed are -180 <= lower < upper <= 180 degrees",
+        ),
+        ("limits_deg.INDEX_PIP_FE = 9\n" + LEAST, 1, "limits_deg.INDEX_PIP_FE is 9; it must be 2 numbers"),
         ("[server]\nfast = true\n" + LEAST, 2, "server.fast is not known here; allowed are host, port"),
     ],
 )
@@ -201,6 +212,7 @@ def test_the_help_shows_the_defaults_there_are() -> None:
     defaults = {field.name: field.default for field in fields(ServerConfig)}
     defaults["look_ahead"] = defaults["look_ahead_s"]
     assert {name: defaults[name] for name in cli.DEFAULTS} == cli.DEFAULTS
+    assert tuple(UNITS_M) == cli.UNITS
 
 
 def test_the_command_line_wins_over_the_rig_file(rig_file) -> None:
@@ -210,3 +222,50 @@ def test_the_command_line_wins_over_the_rig_file(rig_file) -> None:
     assert (config.port, config.osc_port, config.input_port) == (0, 0, 5556)
     assert config.vmc == ("localhost", 39539)
     assert config.actors[0].objects[0].name == "Box"
+
+
+def configured(*options: str) -> ServerConfig:
+    return cli.configure(cli.build_parser().parse_args(list(options)))
+
+
+def test_every_key_of_a_rig_may_be_set_on_the_command_line(rig_file) -> None:
+    path = rig_file("[server]\nport = 1234\n" + LEAST)
+    config = configured(
+        *("--rig", str(path), "--set", "bodies.left_wrist=LeftHand", "--set", "bodies.right_wrist.body = 7"),
+        *("--set", "bodies.right_wrist.position=[0, 0.02, 0]", "--set", "hand_scale=0.9", "--set", "server.port=0"),
+        *("--set", "limits_deg.INDEX_PIP_FE=[-5, 90]"),
+    )
+    (actor,) = config.actors
+    assert actor.wrists["left_wrist"] == BodyConfig("LeftHand")
+    assert actor.wrists["right_wrist"].key == 7
+    assert actor.wrists["right_wrist"].offset[1] == 0.02
+    assert (actor.hand_scale, config.port, config.rig) == (0.9, 0, path)
+    assert actor.limits["INDEX_PIP_FE"] == pytest.approx(np.radians([-5, 90]))
+    assert configured("--set", "bodies.left_wrist=3").actors[0].wrists["left_wrist"].key == 3
+
+
+@pytest.mark.parametrize(
+    ("setting", "complaint"),
+    [
+        ("bodies", "--set bodies: is no KEY=VALUE as in a rig file, for example bodies.left_wrist=3"),
+        ("=3", "--set =3: is no KEY=VALUE"),
+        ("bodies.left=1", "--set bodies.left=1: bodies.left is not known here; allowed are left_wrist, right_wrist"),
+        ("hand_scale=big", "--set hand_scale=big: hand_scale is 'big'; it must be a number"),
+    ],
+)
+def test_a_wrong_setting_is_named_with_what_is_allowed(setting: str, complaint: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        configured("--set", setting)
+    assert complaint in str(error.value)
+
+
+def test_a_mesh_may_be_one_of_the_library(rig_file) -> None:
+    path = rig_file(LEAST.replace("mug.obj", "mug"))
+    assert load_rig(path).actors[0].objects[0].mesh == library_file("mug")
+    assert parse_object("Box=mug").mesh == library_file("mug")
+
+
+def test_a_rig_saved_with_a_byte_order_mark_is_read(rig_file) -> None:
+    path = rig_file(LEAST)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert load_rig(path).actors[0].wrists["right_wrist"].key == 2

@@ -8,6 +8,7 @@ import numpy as np
 
 from manipnet.config import WRISTS, ActorConfig, BodyConfig, BodyKey
 from manipnet.geometry import Array, compose, invert
+from manipnet.hand.skeleton import DOF_NAMES
 from manipnet.network.bundle import Bundle
 from manipnet.objects.shape import Shape
 from manipnet.output_guard import OutputGuard
@@ -36,14 +37,14 @@ class ShownHand:
 class Hand:
     """One hand's memory: what it was synthesised to, what it shows, and which prop it is about."""
 
-    def __init__(self, side: Side, bundle: Bundle, counters: Counters) -> None:
+    def __init__(self, side: Side, rest_angles: Array, limits: Array, counters: Counters) -> None:
         self.side: Side = side
         self.prop: str | None = None
         self.resting = False
         """Asked to rest: no synthesis until the hand has eased there."""
-        self._rest_angles = bundle.rest_angles
-        self._presence = Presence(bundle.rest_angles, OutputGuard(bundle.limits, counters))
-        self.memory = state_of(bundle.rest_angles)
+        self._rest_angles = rest_angles
+        self._presence = Presence(rest_angles, OutputGuard(limits, counters))
+        self.memory = state_of(rest_angles)
 
     @property
     def shown(self) -> Shown | None:
@@ -93,8 +94,10 @@ class Actor:
         self.timeline = Timeline(look_ahead_s)
         self.props = list(props)
         self.seq = 0
+        limits = _limits(config, bundle.limits)
+        rest_angles = np.clip(bundle.rest_angles, *limits.T)
         self.hands: dict[Side, Hand] = {
-            side: Hand(side, bundle, counters) for side in SIDES if f"{side}_wrist" in config.wrists
+            side: Hand(side, rest_angles, limits, counters) for side in SIDES if f"{side}_wrist" in config.wrists
         }
         self._parts, self._offsets = _parts(config), _offsets(config)
         self._last: tuple[int, int] | None = None
@@ -252,6 +255,14 @@ def _offsets(config: ActorConfig) -> dict[str, Array]:
     """Where each part sits on its body, unless it is that body."""
     bodies = config.wrists | {thing.name: thing.body for thing in config.objects}
     return {part: body.offset for part, body in bodies.items() if body.offset is not None}
+
+
+def _limits(config: ActorConfig, limits: Array) -> Array:
+    """The model's limits `(20, 2)`, narrowed as the actor's rig says."""
+    limits = limits.copy()
+    for name, ends in config.limits.items():
+        limits[DOF_NAMES.index(name)] = np.clip(ends, *limits[DOF_NAMES.index(name)])
+    return limits
 
 
 def _placed(body: BodyConfig, offset: Array) -> BodyConfig:

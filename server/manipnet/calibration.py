@@ -182,7 +182,7 @@ def measured_length(side: Side, wrist: Steady, T_world_sheet: Array) -> float:
     if beside_m > SIDEWAYS_M:
         raise CalibrationError(
             f"the {side} middle finger points {100 * beside_m:.0f} cm beside its mark, at most "
-            f"{100 * SIDEWAYS_M:.0f} cm; calibrate the wrists first, then touch the mark with the tip of a straight middle finger"
+            f"{100 * SIDEWAYS_M:.0f} cm; calibrate the wrists first, then touch it with a straight middle finger"
         )
     return length
 

@@ -6,11 +6,14 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from manipnet import __version__
+
+if TYPE_CHECKING:
+    from manipnet.config import ServerConfig
 
 DEFAULTS = {
     "host": "127.0.0.1",
@@ -23,12 +26,14 @@ DEFAULTS = {
     "model": "manipnet-small",
     "look_ahead": 0.5,
 }
+UNITS = ("m", "dm", "cm", "mm", "in")
 """Shown in the help; the values themselves live in `config.ServerConfig`, which a test compares with these."""
 
 EPILOG = """examples:
   manipnet-serve --demo                                   a recorded performance, looped
   manipnet-serve --mesh Box=mug.obj                       bodies left_wrist, right_wrist and Box
   manipnet-serve --rig stage.toml --look-ahead 0.1        bodies as the rig file says
+  manipnet-serve --set bodies.left_wrist=3 --mesh 7=mug   streaming ids; a mug of the library
 Everything in a rig file's [server] table may be given here too, and then wins."""
 
 
@@ -46,6 +51,14 @@ def build_parser() -> argparse.ArgumentParser:
     what.add_argument("--rig", type=Path, metavar="FILE", help="rig file (TOML): which body is which wrist or prop")
     what.add_argument(
         "--mesh", action="append", default=[], metavar="NAME=FILE", help="the body NAME carries this mesh; repeatable"
+    )
+    what.add_argument("--objects", type=Path, metavar="FOLDER", help="your own meshes, to choose from; watched")
+    what.add_argument("--objects-unit", choices=UNITS, help="their unit (default: m)")
+    what.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="any key of a rig file, as there; repeatable"
+    )
+    what.add_argument(
+        "--print-config", action="store_true", help="print what all this comes to, as a rig file, and end"
     )
     what.add_argument("--natnet", metavar="SERVER[:1510]", help="also connect to OptiTrack Motive on that machine")
     what.add_argument("--multicast", action="store_true", help="Motive streams by multicast")
@@ -89,7 +102,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     terminal = Terminal()
     logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
     try:
-        server = Server(configure(arguments), terminal.say)
+        config = configure(arguments)
+        if arguments.print_config:
+            print(describe(config), end="")
+            return 0
+        server = Server(config, terminal.say)
         server.run(stop.is_set)
     except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
@@ -113,24 +130,32 @@ def _option(group: Any, name: str, kind: type, metavar: str, text: str) -> None:
     )
 
 
-def configure(arguments: argparse.Namespace):
+def describe(config: "ServerConfig") -> str:
+    """A configuration as a rig file. Raises `ConfigError` for one that no server can be started from."""
+    from manipnet.config import check
+    from manipnet.rig_file import rig_text
+
+    check(config)
+    return rig_text(config)
+
+
+def configure(arguments: argparse.Namespace) -> "ServerConfig":
     """Defaults, then the rig file's `[server]`, then the command line. Raises `ConfigError`."""
-    from manipnet.config import ConfigError, ServerConfig, default_actor, parse_endpoint, parse_network, parse_object
+    from manipnet.config import ConfigError, ServerConfig, parse_endpoint, parse_network, parse_object
     from manipnet.rig import load_rig
     from manipnet.streams import livelink_json, natnet, vmc
 
     objects = tuple(parse_object(text) for text in arguments.mesh)
     if arguments.rig is not None and (objects or arguments.demo):
-        raise ConfigError("--rig names the objects itself; leave out --mesh and --demo")
+        raise ConfigError("--rig names the objects itself; leave out --mesh and --demo, or change a key with --set")
     if arguments.demo:
         from manipnet.demo.performance import demo_objects
 
         objects = demo_objects(objects)
-    options: dict[str, Any] = {}
-    actors = (default_actor(objects),)
-    if arguments.rig is not None:
-        rig = load_rig(arguments.rig)
-        actors, options = rig.actors, dict(rig.server)
+    rig = load_rig(arguments.rig, arguments.set)
+    first, *others = rig.actors
+    actors = (replace(first, objects=first.objects + objects), *others)
+    options: dict[str, Any] = dict(rig.server)
     options |= {name: value for name, value in vars(arguments).items() if value is not None and value is not False}
     if "look_ahead" in options:
         options["look_ahead_s"] = float(options["look_ahead"])

@@ -1,12 +1,14 @@
 """What a server is told before it starts: frozen values, checked here, whoever filled them in."""
 
 import ipaddress
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
 
 from manipnet.geometry import Array
 from manipnet.network.bundle import DEFAULT_MODEL
+from manipnet.objects.library import library_file
 from manipnet.streams.guard import Network
 from manipnet.timeline import MAX_LOOK_AHEAD_S
 
@@ -52,6 +54,8 @@ class ActorConfig:
     """By `WRISTS`; one may be missing."""
     objects: tuple[ObjectConfig, ...] = ()
     hand_scale: float = 1.0
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Lower and upper limit in radians of some angles of `skeleton.DOF_NAMES`, inside the model's own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +80,10 @@ class ServerConfig:
     livelink: tuple[str, int] | None = None
     model: str = DEFAULT_MODEL
     look_ahead_s: float = MAX_LOOK_AHEAD_S
+    objects: Path | None = None
+    """Folder of the user's own object meshes."""
+    objects_unit: str = "m"
+    """Their unit."""
     keys: Path | None = None
     """Folder of the CURVE keys of `manipnet keys`."""
     allow: tuple[Network, ...] = ()
@@ -83,6 +91,8 @@ class ServerConfig:
     insecure: bool = False
     demo: bool = False
     dump_dir: Path | None = None
+    rig: Path | None = None
+    """The file this came from, where calibrations are stored."""
 
 
 def default_actor(objects: tuple[ObjectConfig, ...] = ()) -> ActorConfig:
@@ -91,11 +101,12 @@ def default_actor(objects: tuple[ObjectConfig, ...] = ()) -> ActorConfig:
 
 
 def parse_object(text: str) -> ObjectConfig:
-    """`NAME=FILE`: the body NAME carries the mesh FILE. Raises `ConfigError`."""
+    """`NAME=FILE`: the body NAME carries the mesh FILE, or one of the library by name. Raises `ConfigError`."""
     name, equals, file = text.partition("=")
     if not (name and equals and file):
-        raise ConfigError(f"{text!r} is no NAME=FILE, for example Box=meshes/mug.obj")
-    return ObjectConfig(name, BodyConfig(int(name) if name.isdecimal() else name), Path(file))
+        raise ConfigError(f"{text!r} is no NAME=FILE, for example Box=meshes/mug.obj or Box=mug")
+    mesh = Path(file) if Path(file).is_file() else library_file(file) or Path(file)
+    return ObjectConfig(name, BodyConfig(int(name) if name.isdecimal() else name), mesh)
 
 
 def parse_endpoint(text: str, default_port: int) -> tuple[str, int]:

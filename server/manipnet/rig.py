@@ -1,8 +1,7 @@
 """Rig files: which streamed body plays which part, in TOML. See `docs/rig.md`."""
 
-import re
-import tomllib
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,10 @@ import numpy as np
 
 from manipnet.config import SCALE_RANGE, WRISTS, ActorConfig, BodyConfig, ConfigError, ObjectConfig
 from manipnet.geometry import Array, quat_normalize
+from manipnet.hand.skeleton import DOF_NAMES
+from manipnet.objects.library import library_file, library_names
 from manipnet.objects.mesh import UNITS_M
+from manipnet.rig_source import read_tree
 from manipnet.timeline import MAX_LOOK_AHEAD_S
 
 MAX_FILE_BYTES = 1_000_000
@@ -33,13 +35,22 @@ SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
     "livelink": (str,),
     "model": (str,),
     "look_ahead": (int, float),
+    "objects": (str,),
+    "objects_unit": (str,),
     "keys": (str,),
     "allow": (list,),
+    "insecure": (bool,),
+    "demo": (bool,),
+    "dump_dir": (str,),
 }
 """What the table `[server]` may hold: the command line's options of these names, which win over it."""
 
 _KINDS = {str: "text", int: "an integer", float: "a number", bool: "true or false", list: "a list of text"}
-_ACTOR_KEYS = ("bodies", "objects", "hand_scale")
+_ACTOR_KEYS = ("bodies", "objects", "hand_scale", "limits_deg")
+_FOLDERS = ("keys", "objects", "dump_dir")
+"""Keys of `[server]` that name folders, as the rig file sees them."""
+_NOBODY_ELSE = "[bodies]\nleft_wrist = 'left_wrist'\nright_wrist = 'right_wrist'\n"
+"""Who is expected when no file says otherwise."""
 _OFFSET_KEYS = ("body", "position", "rotation")
 
 
@@ -51,8 +62,13 @@ class Rig:
     server: dict[str, Any] = field(default_factory=dict)
 
 
-def load_rig(path: Path) -> Rig:
-    """Read a rig file. Raises `ConfigError`, whose text starts with the file and, where it can, the line."""
+def load_rig(path: Path | None, settings: Sequence[str] = ()) -> Rig:
+    """Read a rig file (None: bodies named like the wrists), with `settings` `KEY=VALUE` on top.
+
+    Raises `ConfigError`, whose text starts with the file and, where it can, the line.
+    """
+    if path is None:
+        return parse_rig(None, Path(), "--set", settings)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -60,18 +76,23 @@ def load_rig(path: Path) -> Rig:
     if len(content) > MAX_FILE_BYTES:
         raise ConfigError(f"{path}: is {len(content)} bytes; a rig file has at most {MAX_FILE_BYTES}")
     try:
-        text = content.decode("utf-8")
-        top = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ConfigError(f"{path}: not TOML: {error}") from None
-    return _Reader(path, text).rig(top)
+        text = content.decode("utf-8-sig")  # some editors begin a file with a byte order mark
+    except ValueError as error:
+        raise ConfigError(f"{path}: not TOML: {error}; save it as UTF-8") from None
+    return parse_rig(text, path.parent, str(path), settings)
+
+
+def parse_rig(text: str | None, folder: Path, where: str, settings: Sequence[str] = ()) -> Rig:
+    """A rig from the text of its file, `where` names it in errors; relative paths start at `folder`."""
+    tree, places = read_tree(_NOBODY_ELSE if text is None else text, where, settings)
+    return _Reader(folder, where, places).rig(tree)
 
 
 class _Reader:
-    """Walks the parsed file; knows where in the text each key stands, for the errors."""
+    """Walks the parsed file; knows in which `places` its keys stand, for the errors."""
 
-    def __init__(self, path: Path, text: str) -> None:
-        self._path, self._lines = path, _key_lines(text)
+    def __init__(self, folder: Path, where: str, places: Mapping[tuple, str]) -> None:
+        self._folder, self._where, self._places = folder, where, places
 
     def rig(self, top: dict[str, Any]) -> Rig:
         several = "actors" in top
@@ -88,9 +109,8 @@ class _Reader:
             self._typed(value, SERVER_KEYS[key], at)
             if allowed := _wrong(key, value):
                 self._fail(at, f"is {value!r}; allowed are {allowed}")
-        if "keys" in server:
-            server["keys"] = self._path.parent / server["keys"]
-        return Rig(actors, server)
+        folders = {key: self._folder / server[key] for key in _FOLDERS if key in server}
+        return Rig(actors, server | folders)
 
     def _actor(self, table: dict[str, Any], at: tuple) -> ActorConfig:
         if at:
@@ -106,14 +126,28 @@ class _Reader:
         hand_scale = self._number(table.get("hand_scale", 1.0), (*at, "hand_scale"))
         if not SCALE_RANGE[0] <= hand_scale <= SCALE_RANGE[1]:
             self._fail((*at, "hand_scale"), f"is {hand_scale}; allowed are {SCALE_RANGE[0]} … {SCALE_RANGE[1]}")
-        return ActorConfig(name, wrists, objects, hand_scale)
+        return ActorConfig(name, wrists, objects, hand_scale, self._limits(table.get("limits_deg", {}), at))
+
+    def _limits(self, value: Any, at: tuple) -> dict[str, tuple[float, float]]:
+        at = (*at, "limits_deg")
+        self._known(self._table(value, at), at, DOF_NAMES)
+        limits: dict[str, tuple[float, float]] = {}
+        for name, ends in value.items():
+            low, high = self._numbers(ends, 2, (*at, name))
+            if not -180.0 <= low < high <= 180.0:
+                self._fail((*at, name), f"is {ends}; allowed are -180 <= lower < upper <= 180 degrees")
+            limits[name] = (math.radians(low), math.radians(high))
+        return limits
 
     def _object(self, table: dict[str, Any], at: tuple) -> ObjectConfig:
         self._known(table, at, ("body", "mesh", "unit", "scale", "name", "position", "rotation"))
         body = BodyConfig(self._key(table.get("body"), (*at, "body")), self._offset(table, at))
-        mesh = self._path.parent / self._typed(table.get("mesh"), (str,), (*at, "mesh"))
-        if not mesh.is_file():
-            self._fail((*at, "mesh"), f"is {table['mesh']!r}; there is no file {mesh}")
+        text = self._typed(table.get("mesh"), (str,), (*at, "mesh"))
+        beside = self._folder / text
+        mesh = beside if beside.is_file() else library_file(text)
+        if mesh is None:
+            library = ", ".join(library_names())
+            return self._fail((*at, "mesh"), f"is {text!r}; there is no file {beside}, and the library has {library}")
         unit = table.get("unit", "m")
         if unit not in UNITS_M:
             self._fail((*at, "unit"), f"is {unit!r}; allowed are {', '.join(UNITS_M)}")
@@ -170,10 +204,9 @@ class _Reader:
                 self._fail((*at, key), f"is not known here; allowed are {', '.join(allowed)}")
 
     def _fail(self, at: tuple, text: str) -> Any:
-        line = next((self._lines[at[:n]] for n in range(len(at), 0, -1) if at[:n] in self._lines), None)
+        place = next((self._places[at[:n]] for n in range(len(at), 0, -1) if at[:n] in self._places), self._where)
         dotted = "".join(f"[{key + 1}]" if isinstance(key, int) else f".{key}" for key in at).lstrip(".")
-        where = f"{self._path}:{line}" if line else f"{self._path}"
-        raise ConfigError(f"{where}: {dotted} {text}")
+        raise ConfigError(f"{place}: {dotted} {text}")
 
 
 def _wrong(key: str, value: Any) -> str:
@@ -184,43 +217,10 @@ def _wrong(key: str, value: Any) -> str:
         return f"0 … {MAX_LOOK_AHEAD_S} s"
     if key == "allow" and not all(isinstance(network, str) for network in value):
         return "networks as text, for example 192.168.1.0/24"
+    if key == "objects_unit" and value not in UNITS_M:
+        return ", ".join(UNITS_M)
     return "y, z" if key == "up" and value not in ("y", "z") else ""
 
 
 def _show(value: Any) -> str:
     return repr(value) if len(repr(value)) <= 60 else f"{type(value).__name__} of {len(repr(value))} characters"
-
-
-_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]#]+?)\s*\]\]?\s*(#.*)?$")
-_ASSIGNMENT = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
-
-
-def _key_lines(text: str) -> dict[tuple, int]:
-    """Line of each table and key of a TOML text, by path; list entries by index. Good enough for messages."""
-    lines: dict[tuple, int] = {}
-    counts: dict[tuple, int] = {}
-    table: tuple = ()
-    for number, line in enumerate(text.splitlines(), 1):
-        if header := _HEADER.match(line):
-            table = _resolve(_split(header[2]), counts)
-            if header[1] == "[[":
-                counts[table] = counts.get(table, -1) + 1
-                table = (*table, counts[table])
-            lines.setdefault(table, number)
-        elif assignment := _ASSIGNMENT.match(line):
-            lines.setdefault((*table, *_split(assignment[1])), number)
-    return lines
-
-
-def _split(dotted: str) -> tuple[str, ...]:
-    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
-
-
-def _resolve(path: tuple, counts: dict[tuple, int]) -> tuple:
-    """The path with the current index after every list of tables on the way, but for the last."""
-    resolved: tuple = ()
-    for i, key in enumerate(path):
-        resolved = (*resolved, key)
-        if i < len(path) - 1 and resolved in counts:
-            resolved = (*resolved, counts[resolved])
-    return resolved

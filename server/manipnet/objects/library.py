@@ -13,6 +13,11 @@ def library_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in LIBRARY_FOLDER.glob("*.ply")))
 
 
+def library_file(name: str) -> Path | None:
+    """The mesh file of the library object `name`, None for a name it does not have."""
+    return LIBRARY_FOLDER / f"{name}.ply" if name in library_names() else None
+
+
 def load_library_mesh(name: str, scale: float = 1.0) -> ClosedMesh:
     """The library object `name`; raises `MeshError` for a name it does not have."""
     if name not in library_names():
