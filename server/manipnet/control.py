@@ -11,7 +11,8 @@ from typing import Any, Final
 import msgpack
 import zmq
 
-from manipnet.publisher import bind, guard
+from manipnet.publisher import bind
+from manipnet.streams.gatekeeper import Gatekeeper
 from manipnet.streams.keys import ServerKeys
 from manipnet.streams.zmq_bodies import zmq_endpoint
 from manipnet.telemetry import CONTROL_OPS, Counters
@@ -51,8 +52,8 @@ class Control:
         rep.setsockopt(zmq.HEARTBEAT_IVL, 1_000)
         rep.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
         rep.setsockopt(zmq.IPV6, int(ipv6))
-        guard(rep, self._context, keys, counters)
         try:
+            self._gatekeeper = Gatekeeper(self._context, rep, counters, keys)
             bind(rep, endpoint, "--control-port")
         except BaseException:
             self._context.term()
@@ -73,12 +74,17 @@ class Control:
         if self._thread.is_alive():
             self._thread.join()
 
+    def connected(self) -> int:
+        """How many clients there are at present. From any thread."""
+        return len(self._gatekeeper.connections)
+
     def _run(self) -> None:
         with self._socket as rep:
             while True:
                 try:
-                    parts = rep.recv_multipart()
-                    rep.send(self.answer(parts))
+                    frames = rep.recv_multipart(copy=False)
+                    self._gatekeeper.connections.delivered(frames[0].get(zmq.SRCFD))
+                    rep.send(self.answer([frame.bytes for frame in frames]))
                 except zmq.ContextTerminated:
                     return
                 except zmq.ZMQError as error:

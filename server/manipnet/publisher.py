@@ -2,11 +2,12 @@
 
 import logging
 import socket
+from collections.abc import Callable
 
 import zmq
 
 from manipnet.config import ConfigError, ServerConfig
-from manipnet.streams.curve import Gatekeeper
+from manipnet.streams.gatekeeper import Gatekeeper
 from manipnet.streams.intake import ListenError
 from manipnet.streams.keys import ServerKeys
 from manipnet.streams.livelink_json import LiveLinkJsonSender
@@ -25,19 +26,27 @@ _log = logging.getLogger(__name__)
 class Publisher:
     """The outputs of one server: ZeroMQ and WebSocket always, VMC and Live Link where configured."""
 
-    def __init__(self, config: ServerConfig, counters: Counters, keys: ServerKeys | None = None) -> None:
+    def __init__(
+        self,
+        config: ServerConfig,
+        counters: Counters,
+        keys: ServerKeys | None = None,
+        record: Callable[[bytes], object] = lambda _: None,
+    ) -> None:
         """Binds all sockets; raises `ListenError` or `ConfigError`, and then holds none.
+
+        `record` is given each message as msgpack, and must return at once.
 
         With `keys` only clients on their list may subscribe, and browsers, which have none, stay on this machine.
         """
-        self._counters, self._keys = counters, keys
+        self._counters, self._keys, self._record = counters, keys, record
         self._context = zmq.Context()
         self._pub: zmq.Socket | None = None
         self._web: WebSocketPublisher | None = None
         self._senders: list[tuple[str, VmcSender | LiveLinkJsonSender]] = []
         try:
             self._pub = self._bind_pub(config.host, config.port)
-            self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.web_port)
+            self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.web_port, counters)
             if config.vmc is not None:
                 self._senders.append(("vmc", VmcSender(*_resolve("--vmc", config.vmc))))
             if config.livelink is not None:
@@ -51,13 +60,20 @@ class Publisher:
         }
         """What it listens on, by what it carries."""
 
+    def connected(self) -> dict[str, int]:
+        """How many clients there are at present, by the socket. From any thread."""
+        assert self._web is not None
+        return {"hands": len(self._gatekeeper.connections), "web": self._web.client_count}
+
     def publish(self, message: HandsMessage) -> None:
         """Send one message to everybody; raises `MessageError` for one that must not leave."""
         assert self._pub is not None
         assert self._web is not None
         binary = encode_binary(message)
-        self._pub.send(TOPIC_MSGPACK + encode_msgpack(message, checked=True))
+        packed = encode_msgpack(message, checked=True)
+        self._pub.send(TOPIC_MSGPACK + packed)
         self._pub.send(TOPIC_BIN + binary)
+        self._record(packed)
         self._counters.add("messages_out", topic="msgpack")
         self._counters.add("messages_out", topic="bin")
         if self._web.client_count:
@@ -90,17 +106,9 @@ class Publisher:
         pub.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
         pub.setsockopt(zmq.MAXMSGSIZE, 1024)  # subscriptions are all that comes in, and CURVE's handshake
         pub.setsockopt(zmq.IPV6, int(ipv6))
-        guard(pub, self._context, self._keys, self._counters)
+        self._gatekeeper = Gatekeeper(self._context, pub, self._counters, self._keys)
         bind(pub, endpoint, "--port")
         return pub
-
-
-def guard(sock: zmq.Socket, context: zmq.Context, keys: ServerKeys | None, counters: Counters) -> None:
-    """Let only clients on the keys' list connect to the context's one socket. Call before it is bound."""
-    if keys is not None:
-        gatekeeper = Gatekeeper(context, keys, counters)
-        gatekeeper.secure(sock)
-        gatekeeper.start()
 
 
 def bind(sock: zmq.Socket, endpoint: str, option: str) -> None:
@@ -115,9 +123,9 @@ def bind(sock: zmq.Socket, endpoint: str, option: str) -> None:
         ) from None
 
 
-def _bind_web(host: str, port: int) -> WebSocketPublisher:
+def _bind_web(host: str, port: int, counters: Counters) -> WebSocketPublisher:
     try:
-        return WebSocketPublisher(host, port)
+        return WebSocketPublisher(host, port, counters)
     except OSError as error:
         raise ListenError(
             f"--web-port: cannot listen on {host}:{port}: {error.strerror or error}; "

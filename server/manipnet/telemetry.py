@@ -41,7 +41,10 @@ BODY_REASONS = (
     "zeros",  # at exactly the origin, far from where it was: a relay's way to say lost
 )
 
-CONTROL_OPS = ("hello", "ping", "status", "objects", "mesh", "select_object", "look_ahead", "rest", "invalid")
+CONTROL_OPS = (
+    *("hello", "ping", "status", "objects", "mesh", "select_object", "place_object", "calibrate"),
+    *("look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "invalid"),
+)
 
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "frames_in": ("source", SOURCES),
@@ -55,6 +58,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
     "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "web")),
     "control_requests": ("op", CONTROL_OPS),
+    "recorded": ("fate", ("written", "lost")),
     "page_frames": ("fate", ("shown", "skipped")),
     "page_ended": ("reason", ("crash",)),
 }

@@ -17,6 +17,7 @@ from manipnet.streams.wire import (
     encode_binary,
     encode_msgpack,
 )
+from manipnet.telemetry import Counters
 
 RATE_HZ = 60
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
@@ -44,6 +45,7 @@ def main() -> None:
     parser.add_argument("--websocket-port", type=int, default=0)
     parser.add_argument("--session", default="s")
     parser.add_argument("--rate", type=float, default=RATE_HZ)
+    parser.add_argument("--skip", type=int, default=0, help="leave out every so-manieth frame, as a network does")
     options = parser.parse_args()
     socket = zmq.Context.instance().socket(zmq.PUB)
     socket.setsockopt(zmq.LINGER, 0)
@@ -52,12 +54,14 @@ def main() -> None:
     port = options.port or socket.bind_to_random_port("tcp://127.0.0.1")
     if options.port:
         socket.bind(f"tcp://127.0.0.1:{port}")
-    websocket = WebSocketPublisher("127.0.0.1", options.websocket_port)
+    websocket = WebSocketPublisher("127.0.0.1", options.websocket_port, Counters())
     print(f"ready tcp://127.0.0.1:{port} {websocket.address}", flush=True)
     start = time.monotonic()
     for seq in itertools.count():
         due = start + seq / options.rate
         time.sleep(max(due - time.monotonic(), 0.0))
+        if options.skip and seq % options.skip == 0:
+            continue
         out = message(seq, seq / RATE_HZ, np.sin(seq / RATE_HZ), options.session)
         payload = encode_binary(out)
         socket.send(TOPIC_BIN + payload)

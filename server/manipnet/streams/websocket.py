@@ -10,17 +10,19 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
+from manipnet.telemetry import Counters
+
 MAX_CLIENTS = 32
 QUEUE_LENGTH = 8
 """Payloads a client may be behind, an eighth of a second; then the oldest go."""
 
-MAX_REQUEST_BYTES = 1024
+MAX_REQUEST_BYTES, MAX_REQUESTS = 1024, 16
 """Clients have nothing to say."""
 
 LOCAL_PAGES = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 """Pages that may connect; any other web site open in the same browser may not watch. Programs send no origin."""
 
-_TRY_AGAIN_LATER = 1013
+_POLICY_VIOLATION, _TRY_AGAIN_LATER = 1008, 1013
 
 
 class WebSocketPublisher:
@@ -29,7 +31,8 @@ class WebSocketPublisher:
     Raises `OSError` when the address cannot be bound.
     """
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int, counters: Counters) -> None:
+        self._counters = counters
         self._clients: dict[asyncio.Event, deque[bytes]] = {}
         self._loop = asyncio.new_event_loop()
         try:
@@ -79,6 +82,7 @@ class WebSocketPublisher:
     async def _feed(self, connection: ServerConnection) -> None:
         """Send what has come whenever the client has taken the last."""
         if len(self._clients) >= MAX_CLIENTS:
+            self._refuse("too_many")
             await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_CLIENTS} clients")
             return
         news = asyncio.Event()
@@ -97,8 +101,13 @@ class WebSocketPublisher:
             reading.cancel()
 
     async def _ignore(self, connection: ServerConnection, news: asyncio.Event) -> None:
-        """Read and forget, so that a connection closed while nothing is published does not linger."""
+        """Read and forget, so that a connection closed while nothing is published does not linger; end a chatter."""
         with contextlib.suppress(ConnectionClosed):
-            async for _ in connection:
-                pass
+            for _ in range(MAX_REQUESTS):
+                await connection.recv()
+            self._refuse("endless")
+            await connection.close(_POLICY_VIOLATION, "nothing is to be said here")
         news.set()
+
+    def _refuse(self, reason: str) -> None:
+        self._counters.add("connections_refused", reason=reason)

@@ -8,10 +8,11 @@ import time
 import zmq
 
 from manipnet.streams.bodies import MAX_MESSAGE_BYTES, MessageError, parse_bodies
-from manipnet.streams.curve import Gatekeeper
+from manipnet.streams.connections import Connections
+from manipnet.streams.gatekeeper import Gatekeeper
 from manipnet.streams.guard import SourceGuard
 from manipnet.streams.intake import Intake, ListenError, Sink
-from manipnet.streams.keys import ServerKeys
+from manipnet.streams.keys import KeyFileError, ServerKeys
 from manipnet.telemetry import Counters
 
 HIGH_WATER_MARK = 64
@@ -50,36 +51,40 @@ class ZmqBodies:
         subscriber = context.socket(zmq.SUB)
         harden(subscriber, self._ipv6)
         subscriber.subscribe(b"")
-        if self._keys is not None:
-            self._gatekeeper = Gatekeeper(context, self._keys, self._counters)
-            self._gatekeeper.secure(subscriber)
-            self._gatekeeper.start()
         try:
+            gatekeeper = Gatekeeper(context, subscriber, self._counters, self._keys)
             subscriber.bind(self._endpoint)
-        except zmq.ZMQError as error:
+        except (zmq.ZMQError, KeyFileError) as error:
             subscriber.close()
             context.term()
+            if isinstance(error, KeyFileError):
+                raise
             raise ListenError(
                 f"cannot listen for bodies on {self._endpoint}: {zmq.strerror(error.errno or 0)}; "
                 "choose a free port (0 takes any) and an address of this machine"
             ) from None
         self.address = subscriber.getsockopt_string(zmq.LAST_ENDPOINT)
-        self._context = context
+        self._context, self._gatekeeper = context, gatekeeper
         # The socket changes hands here, once, and belongs to the thread from now on.
-        self._thread = threading.Thread(target=self._run, args=(subscriber,), name="zmq-bodies", daemon=True)
+        self._thread = threading.Thread(
+            target=self._run, args=(subscriber, gatekeeper.connections), name="zmq-bodies", daemon=True
+        )
         self._thread.start()
 
     def stop(self) -> None:
         """Stop receiving and free the port; returns when both are done. Harmless when not started."""
-        if self._thread is None or self._context is None:
+        if self._thread is None or self._context is None or self._gatekeeper is None:
             return
         self._context.term()  # wakes the thread with ContextTerminated and waits until it closed its socket
         self._thread.join()
-        if self._gatekeeper is not None:
-            self._gatekeeper.join()
+        self._gatekeeper.join()
         self._thread = self._context = self._gatekeeper = None
 
-    def _run(self, subscriber: zmq.Socket) -> None:
+    def connected(self) -> int:
+        """How many senders there are at present. From any thread."""
+        return 0 if self._gatekeeper is None else len(self._gatekeeper.connections)
+
+    def _run(self, subscriber: zmq.Socket, connections: Connections) -> None:
         with subscriber:
             skipping = False
             while True:
@@ -87,6 +92,7 @@ class ZmqBodies:
                     part = subscriber.recv(copy=False)
                 except zmq.ContextTerminated:
                     return
+                connections.delivered(part.get(zmq.SRCFD))
                 if part.more or skipping:  # every part of a multipart message passes here, only its last counts
                     skipping = part.more
                     if not skipping:
