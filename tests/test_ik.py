@@ -7,9 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from manipnet.geometry import compose, quat_exp
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, DOF_LIMITS_RAD
 from manipnet.ik.ccd import solve_ccd
+from manipnet.ik.grip import grip_into, hold_share
 from manipnet.ik.least_squares import solve_least_squares
 from manipnet.ik.targets import mix_distances, place_targets
 from manipnet.objects.mesh import closed_mesh
@@ -34,7 +36,7 @@ def solve(name, ball, angles, targets, center=FAR):
     if name == "ccd":
         solve_ccd(angles, targets, DOF_LIMITS_RAD)
     else:
-        solve_least_squares(angles, targets, NOT_TOUCHING, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0)
+        solve_least_squares(angles, targets, NOT_TOUCHING, 0.0, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0)
     return angles
 
 
@@ -99,3 +101,62 @@ def test_targets_follow_appendix_b(ball):
 def test_mixing_trusts_the_prediction_inside_and_the_position_outside():
     assert mix_distances(0.01, -0.01) == pytest.approx(0.8 * 0.01 - 0.2 * 0.01)
     assert mix_distances(0.01, 0.02) == pytest.approx(0.2 * 0.01 + 0.8 * 0.02)
+
+
+def carried(speed_m_s, turn_rad_s):
+    """A window of a wrist that moves and turns."""
+    t = np.linspace(-0.5, 0.5, 21)
+    return np.stack(
+        [np.concatenate([[speed_m_s * s, 1.0, 0.0], quat_exp(np.array([0.0, turn_rad_s * s, 0.0]))]) for s in t]
+    )
+
+
+BESIDE = np.array([0.1, 0.0, -0.05, 0.0, 0.6, 0.0, 0.8])
+STILL = np.tile(np.array([0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), (21, 1))
+
+
+@pytest.mark.parametrize(("speed", "turn"), [(0.2, 0.0), (0.0, 1.0), (0.1, -0.7)])
+def test_an_object_that_moves_with_the_wrist_is_held(speed, turn):
+    wrist = carried(speed, turn)
+    assert hold_share(wrist, compose(wrist, np.tile(BESIDE, (21, 1)))) == pytest.approx(1.0)
+
+
+def test_an_object_that_rests_or_moves_by_itself_is_not_held():
+    wrist = carried(0.3, 0.5)
+    assert hold_share(wrist, STILL) == 0.0
+    assert hold_share(STILL, wrist) == 0.0
+    assert hold_share(STILL, compose(STILL, np.tile(BESIDE, (21, 1)))) == 0.0
+
+
+def test_a_grip_is_the_thumb_and_the_nearest_fingers():
+    distances, grip = np.full(22, 0.05), np.empty(5)
+    distances[5:8] = distances[18] = 0.012  # the index finger
+    distances[8:11] = distances[19] = 0.016
+    grip_into(distances, 0.8, grip)
+    assert grip[0] == grip[1] == pytest.approx(0.8)
+    assert 0.0 < grip[2] < 0.8
+    assert np.all(grip[3:] == 0.0)
+
+
+def test_a_hand_that_holds_closes_on_the_object(ball):
+    """Fingers that no prediction says touch come onto the surface once the hand holds."""
+    start = np.tile([0.1, 0.0, 0.1, 0.1], 5)
+    positions, _ = forward_kinematics(start)
+    center = positions[19] + np.array([0.0, 0.0, -0.03 - 0.02])
+    gaps = []
+    for hold in (0.0, 1.0):
+        angles = start.copy()
+        for _ in range(20):
+            targets, _ = forward_kinematics(angles)
+            solve_least_squares(
+                angles, targets, NOT_TOUCHING, hold, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0
+            )
+        gaps.append(fingertip_gaps(forward_kinematics(angles)[0], center).min())
+    assert gaps[0] > 0.008
+    assert -0.008 < gaps[1] < 0.002
+
+
+def fingertip_gaps(positions, center):
+    along = np.linspace(0.0, 1.0, 9)[:, None, None]
+    start, end = positions[CAPSULE_JOINTS[6:, 0]], positions[CAPSULE_JOINTS[6:, 1]]
+    return np.linalg.norm(start + along * (end - start) - center, axis=-1) - 0.03 - CAPSULE_RADII_M[6:]

@@ -5,7 +5,7 @@ answer with. Hands are kept at the capture's 120 Hz, so both halves of it serve 
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,11 @@ class HandTrack:
 
     def __len__(self) -> int:
         return len(self.wrist)
+
+    def backwards(self) -> "HandTrack":
+        """The same played from its end."""
+        flipped = {name: getattr(self, name)[::-1].copy() for name in ("wrist", "other_wrist", "object", "angles")}
+        return replace(self, **flipped)
 
     def windows(self, frames: np.ndarray, speed: Array | None = None) -> Windows:
         """Windows about `frames (N,)`, the ends of the take held; `speed (N,)` plays time faster or slower."""

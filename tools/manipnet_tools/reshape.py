@@ -105,4 +105,4 @@ def _solve_frames(angles, targets, wrist, obj, mirrored, limits, field):
         for j in range(22):
             local[j] = to_wrist @ targets[t, j] + origin
         for _ in range(2):
-            solve_least_squares(angles[t], local, apart, limits, field, rotation, translation, 1.0)
+            solve_least_squares(angles[t], local, apart, 0.0, limits, field, rotation, translation, 1.0)

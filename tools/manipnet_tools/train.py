@@ -42,9 +42,9 @@ class TrainConfig:
     hidden: tuple[str, ...] = ()
     """Inputs the network does not see: names of blocks, or `future`."""
     dropout: float = 0.3
-    rounds: int = 6
+    rounds: int = 4
     """New samples are made this often."""
-    epochs_per_round: int = 6
+    epochs_per_round: int = 5
     batch: int = 128
     learning_rate: float = 7e-4
     weight_decay: float = 1e-2
@@ -62,6 +62,8 @@ class TrainConfig:
     warp: float = 0.2
     captured: float = 0.3
     """Samples at captured poses, per captured frame and round."""
+    backwards: bool = True
+    """Learn every take played backwards as well: taking hold and letting go are each other's mirror images in time."""
     seed: int = 0
 
 
@@ -88,7 +90,11 @@ def train(tracks: Sequence[HandTrack], config: TrainConfig, share: float = 1.0) 
     """Train on the first `share` of each track. Deterministic for a seed, on one thread: with the small batches that
     train best, a second thread waits more than it works."""
     started = time.monotonic()
+    takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
     spans = spans_of(tracks, share)
+    if config.backwards:
+        spans += [(len(track) - high, len(track) - low) for track, (low, high) in zip(tracks, spans, strict=True)]
+        tracks = [*tracks, *(track.backwards() for track in tracks)]
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
     rng = np.random.default_rng(config.seed)
@@ -117,7 +123,6 @@ def train(tracks: Sequence[HandTrack], config: TrainConfig, share: float = 1.0) 
             turn + 1, config.rounds, len(samples), loss, time.monotonic() - started,
         )  # fmt: skip
     shipped = cast(ManipNet, average.module) if config.average else model
-    takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
     return Trained(shipped.eval(), rest, limits, config, takes, share, time.monotonic() - started)
 
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from manipnet.ik.ccd import solve_ccd
 from manipnet.ik.chains import clamp
+from manipnet.ik.grip import hold_share
 from manipnet.ik.least_squares import solve_least_squares
 from manipnet.ik.targets import place_targets
 from manipnet.kernels import njit
+from manipnet.network.layout import PRESENT
 from manipnet.sensing.scene import object_from_wrist
 
 SolverName = Literal["least_squares", "ccd", "none"]
@@ -34,14 +36,15 @@ def correct_by_least_squares(
 ):
     """Move `angles (20,)` toward the contacts that joint `positions (22, 3)` and predicted `distances (22,)` call for.
 
-    `wrist` and `obj` are the present poses `(7,)` in the scene the network sees; `correction (20,)` is carried from
+    `wrist` and `obj` are windows `(21, 7)` of the scene the network sees; `correction (20,)` is carried from
     tick to tick.
     """
     rotation, translation, targets = np.empty((3, 3)), np.empty(3), np.empty((22, 3))
     predicted = angles.copy()
-    object_from_wrist(wrist, obj, mirrored, rotation, translation)
+    object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
     place_targets(bvh, field, rotation, translation, scale, exact_within_m, positions, distances, targets)
-    solve_least_squares(angles, targets, distances, limits, field, rotation, translation, scale)
+    hold = hold_share(wrist, obj)
+    solve_least_squares(angles, targets, distances, hold, limits, field, rotation, translation, scale)
     _fade(angles, predicted, correction, limits)
 
 
@@ -52,7 +55,7 @@ def correct_by_ccd(
     """The same with the paper's solver."""
     rotation, translation, targets = np.empty((3, 3)), np.empty(3), np.empty((22, 3))
     predicted = angles.copy()
-    object_from_wrist(wrist, obj, mirrored, rotation, translation)
+    object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
     place_targets(bvh, field, rotation, translation, scale, exact_within_m, positions, distances, targets)
     solve_ccd(angles, targets, limits)
     _fade(angles, predicted, correction, limits)

@@ -19,6 +19,7 @@ from manipnet.ik.chains import (
     clamp,
     dof_moves,
 )
+from manipnet.ik.grip import grip_into
 from manipnet.kernels import njit
 from manipnet.objects.field import field_distance
 from manipnet.sensing.scene import map_direction_back, map_point
@@ -37,6 +38,10 @@ PULL_REACH_M = 0.012
 """Capsules this near the surface that the network says are in contact are pulled onto it."""
 CONTACT_MARGIN_M = 0.006
 """A predicted distance of a capsule's radius means contact; this much more means none."""
+GRIP_SHARE = 0.7
+"""Pull on the fingers of a hand that holds, over that on capsules the network says touch."""
+GRIP_REACH_M = 0.030
+"""How far away the surface may be that they are pulled onto."""
 _MAX_STEP_RAD = 0.2
 
 
@@ -68,12 +73,13 @@ def _add_targets(finger, positions, axes, targets, normal, slope):
 
 
 @njit(cache=True, nogil=True)
-def _add_surface(finger, positions, axes, distances, field, rotation, translation, scale, normal, slope):
+def _add_surface(finger, positions, axes, distances, grip, field, rotation, translation, scale, normal, slope):
     row = np.empty(DOFS)
+    reach = PULL_REACH_M + grip * (GRIP_REACH_M - PULL_REACH_M)
     for c in CAPSULES[finger]:
         start, end, radius = CAPSULE_STARTS[c], CAPSULE_ENDS[c], CAPSULE_RADII[c]
         clearance = min(distances[start], distances[end]) - radius
-        touching = min(max(1.0 - clearance / CONTACT_MARGIN_M, 0.0), 1.0)
+        touching = max(min(1.0 - clearance / CONTACT_MARGIN_M, 1.0), GRIP_SHARE * grip)
         for s in range(SAMPLES):
             f = (s + 0.5) / SAMPLES
             x = positions[start, 0] + f * (positions[end, 0] - positions[start, 0])
@@ -84,7 +90,7 @@ def _add_surface(finger, positions, axes, distances, field, rotation, translatio
             depth = radius - ALLOWED_DEPTH_M - distance * scale
             weight = SURFACE_WEIGHT
             if depth <= 0.0:
-                weight = PULL_WEIGHT * touching * max(1.0 + depth / PULL_REACH_M, 0.0) ** 2
+                weight = PULL_WEIGHT * touching * max(1.0 + depth / reach, 0.0) ** 2
                 if weight == 0.0:
                     continue
             nx, ny, nz = map_direction_back(rotation, gx, gy, gz)
@@ -120,12 +126,14 @@ def _solve_in_place(normal, slope):
 
 
 @njit(cache=True, nogil=True)
-def solve_least_squares(angles, targets, distances, limits, field, rotation, translation, scale):
-    """Move `angles (20,)` in place toward joint `targets (22, 3)`, inside `limits (20, 2)`, out of the object."""
+def solve_least_squares(angles, targets, distances, hold, limits, field, rotation, translation, scale):
+    """Move `angles (20,)` in place toward joint `targets (22, 3)`, inside `limits (20, 2)`, out of the object, and
+    onto it where predicted `distances (22,)` or the share `hold` of a grip say so."""
     start = angles.copy()
     positions, rotations = np.empty((22, 3)), np.empty((BONE_COUNT, 3, 3))
     axes = np.empty((DOF_COUNT, 3))
-    normal, slope = np.empty((DOFS, DOFS)), np.empty(DOFS)
+    normal, slope, grip = np.empty((DOFS, DOFS)), np.empty(DOFS), np.empty(FINGERS)
+    grip_into(distances, hold, grip)
     for _ in range(ITERATIONS):
         forward_kinematics_into(angles, positions, rotations, axes)
         for finger in range(FINGERS):
@@ -135,7 +143,9 @@ def solve_least_squares(angles, targets, distances, limits, field, rotation, tra
                 normal[k, k] = STAY_WEIGHT_M2 + 1e-9
                 slope[k] = STAY_WEIGHT_M2 * (start[dof] - angles[dof])
             _add_targets(finger, positions, axes, targets, normal, slope)
-            _add_surface(finger, positions, axes, distances, field, rotation, translation, scale, normal, slope)
+            _add_surface(
+                finger, positions, axes, distances, grip[finger], field, rotation, translation, scale, normal, slope
+            )
             _solve_in_place(normal, slope)
             for k in range(DOFS):
                 dof = DOFS * finger + k
