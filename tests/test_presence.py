@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
 from manipnet.hand.skeleton import DOF_LIMITS_RAD
-from manipnet.output_guard import MAX_SPEED_RAD_S, NotFiniteError, OutputGuard
+from manipnet.output_guard import MAX_SPEED_RAD_S, MAX_WRIST_RAD_S, NotFiniteError, OutputGuard
 from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S, Presence, Shown, State, state_at_age
 from manipnet.telemetry import Counters
 from manipnet.timeline import TICK_S
@@ -114,6 +114,39 @@ def test_a_pose_that_is_not_finite_is_refused_and_changes_nothing() -> None:
     with pytest.raises(NotFiniteError):
         hand.show("live", np.where(np.arange(20) == 7, np.nan, FIST), HERE, 0, "mug", TICK_S)
     assert hand.shown is before
+
+
+@pytest.mark.parametrize("wrist", [HERE * np.nan, np.append(HERE[:3], [np.inf, 0, 0, 1]), np.append(HERE[:3], 4 * [0])])
+def test_a_wrist_that_is_no_pose_is_refused_and_changes_nothing(wrist) -> None:
+    hand = presence()
+    before = run(hand, 3, "live", FIST, HERE)[-1]
+    with pytest.raises(NotFiniteError):
+        hand.show("live", FIST, wrist, 0, "mug", TICK_S)
+    assert hand.shown is before
+    with pytest.raises(NotFiniteError):
+        presence().show("live", FIST, wrist, 0, "mug", TICK_S)
+
+
+@pytest.mark.parametrize("away", [THERE, np.concatenate([HERE[:3], quat_exp(np.array([0.0, 3.0, 0.0]))])])
+def test_a_wrist_that_is_elsewhere_at_once_is_followed_without_a_jump(away) -> None:
+    hand = presence()
+    shown = run(hand, 5, "live", FIST, HERE) + run(hand, 60, "live", FIST, away)
+    for a, b in pairwise(shown):
+        turn = quat_log(quat_multiply(b.wrist[3:], a.wrist[3:] * np.array([-1, -1, -1, 1])))
+        assert np.linalg.norm(b.wrist[:3] - a.wrist[:3]) < 0.15
+        assert np.linalg.norm(turn) < MAX_WRIST_RAD_S * TICK_S
+    assert np.allclose(shown[-1].wrist, away, atol=1e-3)
+
+
+def test_a_fast_wrist_is_shown_where_it_is() -> None:
+    hand = presence()
+    path = [HERE + np.array([0.3 * tick, 0, 0, 0, 0, 0, 0]) for tick in range(10)]  # 18 m/s
+    assert all(np.array_equal(run(hand, 1, "live", FIST, wrist)[0].wrist, wrist) for wrist in path)
+
+
+def test_the_first_pose_shown_is_inside_the_limits_too() -> None:
+    (shown,) = run(presence(), 1, "live", FIST + 1.0, HERE)
+    assert np.all(shown.angles <= FIST)
 
 
 def test_angles_outside_the_limits_or_too_fast_are_kept_in_and_counted() -> None:

@@ -192,6 +192,7 @@ def test_an_internal_error_shows_the_last_good_pose_leaves_a_dump_and_goes_on(
     held = [message.hands["left"].angles for message in messages[18:22]]
     assert all(np.array_equal(held[0], angles) for angles in held)
     assert sum(counters.snapshot()["tick_errors"].values()) == 3
+    bench.loop._recorder.finish()
     (dump,) = tmp_path.glob("manipnet-*.json")
     content = json.loads(dump.read_text())
     assert content["error"]

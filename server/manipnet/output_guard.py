@@ -9,10 +9,13 @@ from manipnet.telemetry import Counters
 
 MAX_SPEED_RAD_S: Final = 40.0
 """The fastest captured finger reaches 35; only an error moves faster than this."""
+MAX_WRIST_M_S: Final = 20.0
+MAX_WRIST_RAD_S: Final = 40.0
+"""Nor is any hand as fast as this."""
 
 
 class NotFiniteError(ArithmeticError):
-    """A pose holds a number that is not finite."""
+    """A pose holds a number that is not finite, or a rotation that is none."""
 
 
 class OutputGuard:
@@ -21,18 +24,32 @@ class OutputGuard:
     def __init__(self, limits: Array, counters: Counters) -> None:
         self._limits, self._counters = limits, counters
 
-    def finite(self, angles: Array) -> Array:
-        """The same `angles`; raises `NotFiniteError`."""
-        if not np.isfinite(angles).all():
-            self._counters.add("output_guarded", reason="not_finite")
-            raise NotFiniteError("a synthesised angle is not finite")
-        return angles
+    def check(self, angles: Array | None, wrist: Array | None) -> None:
+        """Raise `NotFiniteError` for `angles (20,)` or a `wrist (7,)` that nobody may see."""
+        if angles is not None and not np.isfinite(angles).all():
+            self._refuse("a synthesised angle is not finite")
+        if wrist is not None and not (np.isfinite(wrist).all() and abs(wrist[3:] @ wrist[3:] - 1.0) < 1e-3):
+            self._refuse("a wrist is no pose")
+
+    def inside(self, angles: Array) -> Array:
+        """`angles (20,)` kept inside their limits."""
+        return self._kept("limit", angles, self._limits[:, 0], self._limits[:, 1])
 
     def within(self, angles: Array, last: Array, dt_s: float) -> Array:
         """`angles (20,)` kept inside their limits and in reach of the `last` ones, `dt_s` before."""
         reach = MAX_SPEED_RAD_S * dt_s
-        safe = self._kept("limit", angles, self._limits[:, 0], self._limits[:, 1])
-        return self._kept("speed", safe, last - reach, last + reach)
+        return self._kept("speed", self.inside(angles), last - reach, last + reach)
+
+    def is_reachable(self, step_m: float, turn_rad: float, dt_s: float) -> bool:
+        """Whether a wrist may go so far within `dt_s`."""
+        reachable = step_m <= MAX_WRIST_M_S * dt_s and turn_rad <= MAX_WRIST_RAD_S * dt_s
+        if not reachable:
+            self._counters.add("output_guarded", reason="speed")
+        return reachable
+
+    def _refuse(self, what: str) -> None:
+        self._counters.add("output_guarded", reason="not_finite")
+        raise NotFiniteError(what)
 
     def _kept(self, reason: str, angles: Array, low: Array, high: Array) -> Array:
         kept = np.clip(angles, low, high)

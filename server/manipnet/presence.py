@@ -86,17 +86,17 @@ class Presence:
 
         `angles (20,)` is the synthesised pose of a live hand; without it the fingers are held, or ease to rest.
         `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays. When the `run` of the
-        stream or the object `held` changes, the hand glides from what it showed. None before a wrist was seen.
+        stream or the object `held` changes, and when the wrist is somewhere else at once, the hand glides from what
+        it showed. None before a wrist was seen.
         Raises `NotFiniteError` and changes nothing.
         """
-        if angles is not None:
-            self._guard.finite(angles)
+        self._guard.check(angles, wrist)
         source = (state, run, held)
         if self.shown is None:
             if wrist is None:
                 return None
             self._finger_source, self._wrist_source = source, run
-            self.shown = Shown(state, self._rest_angles if angles is None else angles, wrist)
+            self.shown = Shown(state, self._rest_angles if angles is None else self._guard.inside(angles), wrist)
         else:
             fingers = self._next_angles(self.shown.angles, state, angles, source, dt_s)
             self.shown = Shown(state, fingers, self._next_wrist(self.shown.wrist, wrist, run, dt_s))
@@ -119,9 +119,23 @@ class Presence:
             return shown
         if self._wrist_source != source:
             self._wrist_source = source
-            turn = quat_log(quat_multiply(shown[3:], quat_conjugate(wrist[3:])))
-            self._wrist.open(np.concatenate([shown[:3] - wrist[:3], turn]))
-        gap = self._wrist.close(dt_s, RETURN_HALF_LIFE_S)
-        if not gap.any():
-            return wrist
-        return np.concatenate([wrist[:3] + gap[:3], quat_multiply(quat_exp(gap[3:]), wrist[3:])])
+            self._wrist.open(_gap(shown, wrist))
+        wanted = _beside(wrist, self._wrist.close(dt_s, RETURN_HALF_LIFE_S))
+        step = _gap(wanted, shown)
+        if self._guard.is_reachable(float(np.linalg.norm(step[:3])), float(np.linalg.norm(step[3:])), dt_s):
+            return wanted
+        self._wrist.open(_gap(shown, wrist))
+        return shown
+
+
+def _gap(shown: Array, wrist: Array) -> Array:
+    """What lies between two poses `(7,)`: a way and a rotation vector `(6,)`, world frame."""
+    turn = quat_log(quat_multiply(shown[3:], quat_conjugate(wrist[3:])))
+    return np.concatenate([shown[:3] - wrist[:3], turn])
+
+
+def _beside(wrist: Array, gap: Array) -> Array:
+    """The pose that `gap` lies between it and `wrist`."""
+    if not gap.any():
+        return wrist
+    return np.concatenate([wrist[:3] + gap[:3], quat_multiply(quat_exp(gap[3:]), wrist[3:])])

@@ -1,15 +1,17 @@
 """The NatNet client against a fake Motive, over real sockets on loopback."""
 
+import ipaddress
 import itertools
 import logging
 import queue
 import socket
+import time
 
 import natnet_capture
 import pytest
 from natnet_writer import Body, Frame, packet, server_info
 
-from fake_motive import FakeMotive
+from fake_motive import CLOCK_HZ, FakeMotive
 from manipnet.streams import natnet_client
 from manipnet.streams.intake import ListenError
 from manipnet.streams.natnet_client import NatNetBodies
@@ -253,6 +255,34 @@ def test_other_hosts_are_refused(connect, heard, counters):
         motive.send(write((3, 0), 1))
         assert heard.next().frame == 1
     assert counters.snapshot()["frames_dropped"] == {"not_allowed": 1}
+
+
+def test_frames_may_come_from_listed_networks_but_answers_only_from_the_server(connect, heard, counters):
+    with FakeMotive() as motive, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second_card:
+        client = connect(motive, allow=[ipaddress.ip_network("127.0.0.2/32")])
+        motive.wait_for(12)
+        motive.send(write((3, 0), 1))
+        assert heard.next().frame == 1
+        second_card.bind(("127.0.0.2", 0))
+        for address in motive.clients:
+            second_card.sendto(packet(1, server_info(version=(2, 9))), address)
+            second_card.sendto(packet(7, write((3, 0), 2)), address)
+        assert heard.next().frame == 2
+        assert client.status()["server"] == "Motive, NatNet 3.0"
+    assert "frames_dropped" not in counters.snapshot()
+
+
+def test_a_frame_tells_when_it_was_captured_on_our_clock(connect, heard):
+    with FakeMotive() as motive:
+        client = connect(motive)
+        motive.wait_for(12)
+        exposed_s = time.monotonic() + motive.clock_offset_s - 0.004
+        motive.send(write((3, 0), timestamp_s=77.0, stamps=(int(exposed_s * CLOCK_HZ), 0, 0)))
+        frame, status = heard.next(), client.status()
+        captured_s = frame.t_s - status["capture_offset_s"]
+        error_s = captured_s - (exposed_s - motive.clock_offset_s)
+        assert abs(error_s) <= status["clock_uncertainty_s"] + 2 / CLOCK_HZ
+        assert captured_s < frame.t_received_s
 
 
 def test_frames_before_the_version_is_known_are_not_guessed_at(heard, counters):

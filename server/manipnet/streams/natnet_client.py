@@ -3,12 +3,12 @@
 import logging
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from manipnet.streams.bodies import BodyFrame, BodySample, MessageError, make_sample
 from manipnet.streams.clock import ClockProbes
-from manipnet.streams.guard import SourceGuard
+from manipnet.streams.guard import AllowList, Network, SourceGuard
 from manipnet.streams.intake import Intake, ListenError, Sink
 from manipnet.streams.natnet import (
     COMMAND_PORT,
@@ -46,7 +46,7 @@ class NatNetBodies:
 
     `interface` is the address of the network card that faces the server (default: the one the system would
     send through), `up` the axis that Motive streams as up, which no packet tells. Datagrams from other hosts are
-    refused.
+    refused, except frames from the networks in `allow` (a Motive with two network cards).
     """
 
     def __init__(
@@ -59,9 +59,10 @@ class NatNetBodies:
         multicast: bool = False,
         interface: str | None = None,
         up: UpAxis = "y",
+        allow: Sequence[Network] = (),
     ) -> None:
         self._intake = Intake("natnet", sink, counters)
-        self._guard = SourceGuard()
+        self._guard, self._allowed = SourceGuard(), AllowList(allow)
         self._host, self._port = host, port
         self._multicast, self._interface, self._up = multicast, interface, up
         self._server: Address = (host, port)
@@ -71,6 +72,7 @@ class NatNetBodies:
         self._names: Mapping[int, str] = {}
         self._names_wanted = True
         self._clock = ClockProbes()
+        self._stamps_ahead_s: float | None = None
         self._heard_s = self._framed_s = float("-inf")
         self._done_s: dict[str, float] = {}
         self._echo_stamp = 0
@@ -102,15 +104,18 @@ class NatNetBodies:
             self._data = None
 
     def status(self) -> dict[str, object]:
-        """What a person needs to know: state, server, names of the bodies, clock offset, what is wrong."""
+        """What a person needs to know: state, server, names of the bodies, what is wrong; and two offsets from our
+        clock: `clock_offset_s` of the server's, `capture_offset_s` of the frames' times (at the exposure).
+        """
         now_s = time.monotonic()
-        info, offset = self._info, self._clock.best(now_s)
+        info, offset, ahead_s = self._info, self._clock.best(now_s), self._stamps_ahead_s
         return {
             "state": self._state(now_s),
             "server": None if info is None else f"{info.application}, NatNet {info.version[0]}.{info.version[1]}",
             "bodies": {str(id): name for id, name in self._names.items()},
             "clock_offset_s": None if offset is None else offset.offset_s,
             "clock_uncertainty_s": None if offset is None else offset.uncertainty_s,
+            "capture_offset_s": None if offset is None or ahead_s is None else offset.offset_s + ahead_s,
             "problem": self._problem,
         }
 
@@ -159,13 +164,15 @@ class NatNetBodies:
         if not self._guard.admits(sender, now_s):
             self._intake.drop("rate", "natnet", "more packets than can be read from senders unknown so far")
             return
-        if sender[0] != self._server[0]:
+        from_server = sender[0] == self._server[0]
+        if not (from_server or self._allowed(sender[0])):
             self._guard.bad(sender)
             self._intake.drop("not_allowed", source, f"the NatNet server is {self._server[0]}")
             return
         try:
             message_id, payload = read_packet(packet)
-            self._take(message_id, payload, source, now_s)
+            if from_server or message_id == MessageId.FRAME:
+                self._take(message_id, payload, source, now_s)
         except MessageError as error:
             self._guard.bad(sender)
             self._intake.drop("malformed", source, error)
@@ -199,6 +206,7 @@ class NatNetBodies:
             return
         if info != self._info or now_s - self._heard_s > SILENT_S:
             self._clock.clear()
+            self._stamps_ahead_s = None
         self._info, self._names_wanted = info, True
         self._report(self._listen_to(info))
 
@@ -221,6 +229,8 @@ class NatNetBodies:
             self._intake.drop("unsupported", source, "a frame before the server told its version")
             return
         frame = read_frame(payload, self._info.version)
+        if frame.exposed_ticks and self._info.clock_hz:
+            self._stamps_ahead_s = frame.timestamp_s - frame.exposed_ticks / self._info.clock_hz
         self._names_wanted = self._names_wanted or frame.models_changed
         self._framed_s = now_s
         self._problem = None

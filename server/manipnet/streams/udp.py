@@ -109,7 +109,7 @@ def bind_udp(what: str, host: str, port: int) -> socket.socket:
 
 
 def join_multicast(group: str, port: int, interface: str) -> socket.socket:
-    """A UDP socket that hears `group:port` through the network card with the address `interface`.
+    """A UDP socket that hears `group:port` through the network card with the address `interface`, and nothing else.
 
     Other programs on this machine may hear the same group. Raises `ListenError`.
     """
@@ -118,7 +118,7 @@ def join_multicast(group: str, port: int, interface: str) -> socket.socket:
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if sys.platform == "darwin":
             udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
-        udp.bind(("", port))
+        udp.bind(("" if sys.platform == "win32" else group, port))  # Windows binds to no group
         membership = socket.inet_aton(group) + socket.inet_aton(interface)
         udp.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
     except OSError as error:
