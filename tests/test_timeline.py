@@ -253,6 +253,14 @@ def test_one_bad_time_stamp_moves_nothing() -> None:
     assert timeline.restarts == 0
 
 
+def test_a_frame_that_was_under_way_too_long_is_called_late() -> None:
+    timeline = Timeline()
+    stream(timeline, np.arange(600) / 120)
+    assert timeline.push(4.2, {"body": screw(4.2)}, 105.0) == "late"
+    assert timeline.push(5.0, {"body": screw(5.0)}, 105.0) is None
+    assert timeline.restarts == 0
+
+
 def test_a_second_sender_is_kept_out_until_the_first_falls_silent() -> None:
     timeline = Timeline()
     for i in range(120):
@@ -345,3 +353,57 @@ def test_the_log_of_rotation_in_a_window_is_steady() -> None:
     q = tick.bodies["body"].window[:, 3:]
     steps = quat_log(quat_multiply(q[1:], q[:-1] * np.array([-1, -1, -1, 1])))
     assert np.allclose(steps[:-1], SPIN * 0.05, atol=1e-6)
+
+
+@pytest.mark.parametrize("drift", [-1e-4, 1e-4])
+def test_a_senders_clock_may_drift_from_ours(drift: float) -> None:
+    """Ticks go by the sender's time, and each still leaves with the frame that completes it: delay does not build up."""
+    timeline = Timeline(0.1)
+    ticks: list[tuple[float, Tick]] = []
+    for i in range(20 * 60):
+        now = 500.0 + i / 60 * (1.0 + drift)
+        ticks += [(now, tick) for tick in drain(timeline, now)]
+        timeline.push(i / 60, {"body": screw(i / 60)}, now)
+        ticks += [(now, tick) for tick in drain(timeline, now)]
+    assert [tick.index for _, tick in ticks] == list(range(len(ticks)))
+    assert len(ticks) == 20 * 60 - 6
+    for now, tick in ticks:
+        assert now == pytest.approx(500.0 + (tick.time_s + 0.1) * (1.0 + drift), abs=1e-6)
+        assert not tick.silent
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+def test_lost_frames_cost_no_tick_and_no_accuracy(share: float) -> None:
+    chance = np.random.default_rng(5)
+    times = [i / 120 for i in range(361) if i in (0, 360) or chance.random() > share]
+    ticks = stream(Timeline(), times)
+    assert [tick.index for tick in ticks] == list(range(len(ticks)))
+    assert len(ticks) >= 60 * 2.5
+    assert all(same_pose(tick.bodies["body"].pose, screw(tick.time_s)) for tick in ticks)
+
+
+def test_a_frame_that_comes_twice_is_used_once() -> None:
+    timeline, single = Timeline(), Timeline()
+    for i in range(121):
+        t, now = i / 120, 10.0 + i / 120
+        assert timeline.push(t, {"body": screw(t)}, now) is None
+        assert timeline.push(t, {"body": screw(t + 0.3)}, now + 1e-3) == "duplicate"
+        assert single.push(t, {"body": screw(t)}, now) is None
+    for a, b in zip(drain(timeline, 11.001), drain(single, 11.001), strict=True):
+        assert np.array_equal(a.bodies["body"].window, b.bodies["body"].window)
+
+
+def test_a_frame_that_comes_late_still_serves_the_past_of_the_window() -> None:
+    timeline, punctual = Timeline(), Timeline()
+    late: list[tuple[float, float]] = []
+    for i in range(121):
+        t, now = i / 120, 10.0 + i / 120
+        punctual.push(t, {"body": screw(t)}, now)
+        if i % 3 == 1:
+            late.append((t, now + 0.3))
+        else:
+            timeline.push(t, {"body": screw(t)}, now)
+        while late and late[0][1] <= now:
+            assert timeline.push(late[0][0], {"body": screw(late.pop(0)[0])}, now) is None
+    for a, b in zip(drain(timeline, 11.0), drain(punctual, 11.0), strict=True):
+        assert same_pose(a.bodies["body"].window, b.bodies["body"].window)

@@ -22,7 +22,7 @@ MAX_WAIT_S = 0.05
 _log = logging.getLogger(__name__)
 
 _TAKEN = ""
-_BEST_FIRST = (_TAKEN, "duplicate", "other_sender", "time_jump", "internal", "unknown_body")
+_BEST_FIRST = (_TAKEN, "duplicate", "other_sender", "late", "time_jump", "internal", "unknown_body")
 """What became of a frame that several actors looked at: the best of what each made of it."""
 
 

@@ -35,6 +35,8 @@ VANISHED_S: Final = 0.1
 RESTART_S: Final = 0.5
 """A frame this far behind the stream, or `AHEAD_S` ahead of it, may be a sender that started again."""
 AHEAD_S: Final = 0.5
+LATE_S: Final = 10.0
+"""A frame up to this far behind was long under way; beyond, it is of another clock."""
 CATCH_UP_S: Final = 0.25
 """A sender that was late, not standing still, has this long to deliver what it kept back."""
 WITNESSES: Final = 3
@@ -175,8 +177,8 @@ class Timeline:
     def push(self, t_s: float, poses: Poses, now_s: float, source: str = "") -> str | None:
         """Take one frame of this actor's bodies; returns why it was dropped, or None.
 
-        Reasons are of `telemetry.DROP_REASONS`: other_sender, time_jump, duplicate. Several senders may share an
-        actor if they share a clock and no body.
+        Reasons are of `telemetry.DROP_REASONS`: other_sender, late, time_jump, duplicate. Several senders may share
+        an actor if they share a clock and no body.
         """
         poses = {key: pose for key, pose in poses.items() if self._may_send(key, source, now_s)}
         if not poses:
@@ -184,7 +186,7 @@ class Timeline:
         run = self._run or self._begin(t_s, now_s)
         silent_for = now_s - run.heard_s
         if not -RESTART_S < t_s - run.newest_s < AHEAD_S + 1.5 * silent_for:
-            return self._doubt(t_s, poses, now_s, source)
+            return self._doubt(run, t_s, poses, now_s, source)
         for key in (_CLOCK, *poses):
             if self._may_send(key, source, now_s):
                 self._senders[key] = (source, now_s)
@@ -331,7 +333,7 @@ class Timeline:
         owner, heard_s = self._senders.get(key, (source, now_s))
         return owner == source or now_s - heard_s >= OTHER_SENDER_S
 
-    def _doubt(self, t_s: float, poses: Poses, now_s: float, source: str) -> str | None:
+    def _doubt(self, run: Run, t_s: float, poses: Poses, now_s: float, source: str) -> str | None:
         """Hold back a frame of an unlikely time until enough others agree with it."""
         if not self._may_send(_CLOCK, source, now_s):
             return "other_sender"
@@ -339,10 +341,10 @@ class Timeline:
             self._witnesses.clear()
         self._witnesses.append((t_s, poses, now_s))
         if len(self._witnesses) < WITNESSES:
-            return "time_jump"
+            return "late" if 0.0 < run.newest_s - t_s < LATE_S else "time_jump"
         witnesses = list(self._witnesses)
         self._senders = dict.fromkeys((_CLOCK, *poses), (source, now_s))
-        run = self._begin(witnesses[0][0], witnesses[0][2])
+        begun = self._begin(witnesses[0][0], witnesses[0][2])
         for witness in witnesses:
-            run.add(*witness)
+            begun.add(*witness)
         return None
