@@ -104,6 +104,8 @@ bodies.left_wrist = "bob_left"
         ("[bodies]\nleft_wrist = {body = 1, position = [nan, 0, 0]}\n", 2, "position is nan; it must be finite"),
         ("wrists = 1\n", 1, "wrists is not known here; allowed are server, bodies, objects, hand_scale"),
         ("hand_scale = 9\n[bodies]\nleft_wrist = 1\n", 1, "hand_scale is 9.0; allowed are 0.2 … 5.0"),
+        (LEAST + "unit = ['cm']\n", 10, "objects[1].unit is ['cm']; it must be text"),
+        (LEAST.replace("mug.obj", "m" * 5000), 8, "objects[1].mesh is str of 5002 characters; there is no file"),
         (LEAST + "unit = 'furlong'\n", 10, "objects[1].unit is 'furlong'; allowed are m, dm, cm, mm, in"),
         (LEAST + "colour = 1\n", 10, "objects[1].colour is not known here"),
         (LEAST.replace("mug", "jug"), 8, "objects[1].mesh is 'jug.obj'; there is no file"),

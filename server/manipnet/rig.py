@@ -1,6 +1,7 @@
 """Rig files: which streamed body plays which part, in TOML. See `docs/rig.md`."""
 
 import math
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -144,11 +145,14 @@ class _Reader:
         body = BodyConfig(self._key(table.get("body"), (*at, "body")), self._offset(table, at))
         text = self._typed(table.get("mesh"), (str,), (*at, "mesh"))
         beside = self._folder / text
-        mesh = beside if beside.is_file() else library_file(text)
+        mesh = beside if os.path.isfile(beside) else library_file(text)  # Path.is_file raises for what is no path
         if mesh is None:
             library = ", ".join(library_names())
-            return self._fail((*at, "mesh"), f"is {text!r}; there is no file {beside}, and the library has {library}")
-        unit = table.get("unit", "m")
+            there = beside if len(text) <= 256 else "of so long a name"
+            return self._fail(
+                (*at, "mesh"), f"is {_show(text)}; there is no file {there}, and the library has {library}"
+            )
+        unit = self._typed(table.get("unit", "m"), (str,), (*at, "unit"))
         if unit not in UNITS_M:
             self._fail((*at, "unit"), f"is {unit!r}; allowed are {', '.join(UNITS_M)}")
         scale = self._number(table.get("scale", 1.0), (*at, "scale"))

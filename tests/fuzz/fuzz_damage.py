@@ -1,7 +1,12 @@
-"""Damaged inputs: good ones cut, spliced, doubled, and sprinkled with the numbers that break readers."""
+"""Damaged inputs: good ones cut, spliced, doubled, and sprinkled with the numbers that break readers; and documents of
+the right form with the wrong things in them. All by a random generator that is an argument."""
 
-from hypothesis import strategies as st
+import copy
+from collections.abc import Iterator, Sequence
+from random import Random
+from typing import Any
 
+MAX_BYTES = 70_000
 _NUMBERS = [
     b"\0",
     b"\xff",
@@ -23,30 +28,93 @@ _NUMBERS = [
     b"/*",
 ]
 
+_ODD = [
+    None,
+    True,
+    -1,
+    0,
+    2**31,
+    2**63,
+    2**64 - 1,
+    0.0,
+    -0.0,
+    1e-320,
+    1e308,
+    float("inf"),
+    float("nan"),
+    "",
+    "x",
+    "x" * 5000,
+    "\0",
+    "\u202e",
+    "..",
+    "/",
+    [],
+    [[]],
+    [0.0] * 300,
+    {},
+    {"": {}},
+    {"x": [{"x": [{}]}]},
+]
 
-@st.composite
-def damaged(draw, good: list[bytes]):
+
+def damaged(rng: Random, good: Sequence[bytes]) -> bytes:
     """A good input with up to six things done to it, or any bytes at all."""
-    if draw(st.integers(0, 19)) == 0:
-        return draw(st.binary(max_size=600))
-    data = draw(st.sampled_from(good))
-    for _ in range(draw(st.integers(1, 6))):
-        at = draw(st.integers(0, len(data)))
-        match draw(st.integers(0, 6)):
-            case 0:
-                data = data[:at]
-            case 1:
-                data = data[at:]
-            case 2:
-                patch = draw(st.sampled_from(_NUMBERS))
-                data = data[:at] + patch + data[at + len(patch) :]
-            case 3:
-                data = data[:at] + draw(st.sampled_from(_NUMBERS)) + data[at:]
-            case 4:
-                data = data[:at] + draw(st.binary(min_size=1, max_size=4)) + data[at + 1 :]
-            case 5:
-                other = draw(st.sampled_from(good))
-                data = data[:at] + other[draw(st.integers(0, len(other))) :]
-            case 6:
-                data = (data * draw(st.integers(2, 50)))[:70_000]
+    if rng.random() < 0.05:
+        return rng.randbytes(rng.randrange(600))
+    data = rng.choice(good)
+    for _ in range(rng.randint(1, 6)):
+        data = _hurt(rng, data, good)
     return data
+
+
+def _hurt(rng: Random, data: bytes, good: Sequence[bytes]) -> bytes:
+    at = rng.randint(0, len(data))
+    match rng.randrange(7):
+        case 0:
+            return data[:at]
+        case 1:
+            return data[at:]
+        case 2:
+            patch = rng.choice(_NUMBERS)
+            return data[:at] + patch + data[at + len(patch) :]
+        case 3:
+            return data[:at] + rng.choice(_NUMBERS) + data[at:]
+        case 4:
+            return data[:at] + rng.randbytes(rng.randint(1, 4)) + data[at + 1 :]
+        case 5:
+            other = rng.choice(good)
+            return data[:at] + other[rng.randint(0, len(other)) :]
+    return (data * rng.randint(2, 50))[:MAX_BYTES]
+
+
+def reshaped(rng: Random, document: Any) -> Any:
+    """A good document in which up to three values are replaced, taken out, doubled, renamed, or joined by others."""
+    document = copy.deepcopy(document)
+    for _ in range(rng.randint(1, 3)):
+        if places := list(_places(document)):
+            _misplace(rng, *rng.choice(places))
+    return document
+
+
+def _misplace(rng: Random, inside: Any, key: Any) -> None:
+    odd = copy.deepcopy(rng.choice(_ODD))
+    match rng.randrange(4):
+        case 0:
+            inside[key] = odd
+        case 1:
+            del inside[key]
+        case 2:
+            inside[key] = [inside[key], copy.deepcopy(inside[key])]
+        case 3 if isinstance(inside, dict):
+            inside[rng.choice(("", "x", "server", "body", "name", "é"))] = inside.pop(key)
+        case 3:
+            inside.insert(key, odd)
+
+
+def _places(inside: Any) -> Iterator[tuple[Any, Any]]:
+    """Every value of a document, as the container it is in and its key."""
+    for key in list(inside) if isinstance(inside, dict) else range(len(inside)):
+        yield inside, key
+        if isinstance(inside[key], dict | list):
+            yield from _places(inside[key])

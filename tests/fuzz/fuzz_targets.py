@@ -3,12 +3,20 @@
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from random import Random
+from typing import Any
 
 import fuzz_paths  # noqa: F401 (must come before the writers)
 import msgpack
 import natnet_writer as natnet
+from fuzz_damage import damaged, reshaped
+from fuzz_files import ACTORS, RIG, bundles, place_recording, place_rig, read_recording, recordings, toml
 from osc_writer import bundle, osc
 
+from manipnet.config import ConfigError
+from manipnet.network.bundle import BundleError, load_bundle
+from manipnet.recording import RecordingError
+from manipnet.rig import load_rig
 from manipnet.streams.bodies import MessageError, parse_bodies
 from manipnet.streams.natnet import read_echo, read_packet, read_server_info
 from manipnet.streams.natnet_frames import read_body_names, read_frame
@@ -20,16 +28,32 @@ VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5)]
 
 @dataclass(frozen=True)
 class Target:
-    """`read` takes bytes and raises nothing but `error`; `good[0]` is read after every damaged input."""
+    """`read` takes what `place` makes of the bytes, itself or a path, and raises nothing but `error`.
 
-    read: Callable[[bytes], object]
+    `good[0]` is read after damaged inputs. `documents` are written by `dump` after odd things were put into them.
+    """
+
+    read: Callable[[Any], object]
     good: list[bytes]
     error: type[Exception] = MessageError
+    documents: tuple[Any, ...] = ()
+    dump: Callable[[Any], bytes] = lambda document: json.dumps(document).encode()
+    place: Callable[[bytes], Any] = lambda data: data
+
+    def case(self, rng: Random) -> bytes:
+        """An input to read, most probably a bad one."""
+        if self.documents and rng.random() < 0.5:
+            return self.dump(reshaped(rng, rng.choice(self.documents)))
+        return damaged(rng, self.good)
 
 
 def _message(bodies: int) -> dict:
     body = {"p": [0.1, -2.0, 3.0], "q": [0.0, 0.6, 0.0, 0.8], "tracked": True}
     return {"t": 1.5, "frame": 7, "bodies": [{"id": n, "name": f"body {n}", **body} for n in range(bodies)]}
+
+
+def _pack(document: Any) -> bytes:
+    return msgpack.packb(document) or b""
 
 
 def _bodies(data: bytes) -> object:
@@ -81,9 +105,20 @@ _NATNET = [
     )
 ]
 
+_BUNDLES = bundles()
+_FEW = _message(3)
+
 TARGETS = {
-    "msgpack": Target(_bodies, [msgpack.packb(_message(n)) for n in (3, 0, 1, 256)]),
-    "json": Target(_bodies, [json.dumps(_message(n)).encode() for n in (3, 0, 1, 256)]),
+    "msgpack": Target(_bodies, [msgpack.packb(_message(n)) for n in (3, 0, 1, 256)], documents=(_FEW,), dump=_pack),
+    "json": Target(_bodies, [json.dumps(_message(n)).encode() for n in (3, 0, 1, 256)], documents=(_FEW,)),
     "osc": Target(_osc, [bundle(*_OSC), *_OSC, bundle(bundle(*_OSC[:3]), bundle(*_OSC[3:]), tag=9), _LARGE]),
     "natnet": Target(_natnet, _NATNET),
+    "rig": Target(load_rig, [toml(RIG), toml(ACTORS)], ConfigError, (RIG, ACTORS), toml, place_rig),
+    "recording": Target(read_recording, recordings(), RecordingError, place=place_recording),
 }
+if _BUNDLES is not None:
+    _META, _DOCUMENTS = _BUNDLES.meta, (json.loads(_BUNDLES.meta),)
+    TARGETS |= {
+        "bundle": Target(load_bundle, [_META], BundleError, _DOCUMENTS, place=_BUNDLES.place_meta),
+        "graph": Target(load_bundle, [_BUNDLES.graph], BundleError, place=_BUNDLES.place_graph),
+    }

@@ -15,4 +15,4 @@ def test_target_stands_damage(name):
 @pytest.mark.parametrize("name", TARGETS)
 def test_good_inputs_are_read(name):
     for data in TARGETS[name].good:
-        TARGETS[name].read(data)
+        TARGETS[name].read(TARGETS[name].place(data))

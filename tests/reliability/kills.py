@@ -9,19 +9,21 @@ import random
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from live_server import LiveServer
 
-from .motion import motion
-from .roles import RATE_HZ, start
+from .motion import motion, recording
+from .roles import start
 from .row import Row, parser, report
 
-BACK_S = 1.0
+RATE_HZ, BACK_S = 120.0, 1.0
 CALM_S = (1.0, 5.0)
 PATIENCE_S = 60.0
 PORTS = {"hands": "port", "bodies": "input-port", "control": "control-port", "osc": "osc-port", "web": "web-port"}
@@ -41,8 +43,8 @@ class Kill:
 class Role:
     """A process of `roles` and what it says."""
 
-    def __init__(self, role: str, address: str) -> None:
-        self._arguments = role, address
+    def __init__(self, role: str, address: str, *more: str) -> None:
+        self._arguments = role, address, *more
         self.process, self.lines = self._start()
 
     def restart(self) -> None:
@@ -70,6 +72,7 @@ class Chaos:
     """A server on ports of its own choice that keep, with its sender and client."""
 
     options: list[str]
+    recording: Path
     sessions: list[str] = field(default_factory=list)
     stuck: list[str] = field(default_factory=list)
 
@@ -85,7 +88,7 @@ class Chaos:
         }
         self.options += [f"--{option}={ports[what]}" for what, option in names.items() if what in ports]
         self.server = server
-        self.sender = Role("perform", server.addresses["bodies"])
+        self.sender = Role("perform", server.addresses["bodies"], str(self.recording))
         self.client = Role("look", server.addresses["hands"])
         self.client.wait_for("live")
         self._note_session()
@@ -137,14 +140,18 @@ def main() -> None:
     arguments = parser(__doc__, 600.0).parse_args()
     rng = random.Random(arguments.seed)
     performance = motion(RATE_HZ)
-    chaos = Chaos([f"--mesh={name}={path}" for name, path in performance.meshes.items()])
     kills: list[Kill] = []
-    end_s = time.monotonic() + arguments.seconds
-    while time.monotonic() < end_s:
-        time.sleep(rng.uniform(*CALM_S))
-        kills.append(chaos.kill(rng.choice(VICTIMS)))
-        print(kills[-1], file=sys.stderr, flush=True)
-    chaos.close()
+    with tempfile.TemporaryDirectory() as folder:
+        meshes = [f"--mesh={name}={path}" for name, path in performance.meshes.items()]
+        chaos = Chaos(meshes, recording(performance, Path(folder)))
+        try:
+            end_s = time.monotonic() + arguments.seconds
+            while time.monotonic() < end_s:
+                time.sleep(rng.uniform(*CALM_S))
+                kills.append(chaos.kill(rng.choice(VICTIMS)))
+                print(kills[-1], file=sys.stderr, flush=True)
+        finally:
+            chaos.close()
     killed = {victim: [kill for kill in kills if kill.victim == victim] for victim in VICTIMS}
     rows = [_row(victim, of_victim) for victim, of_victim in killed.items() if of_victim]
     starts = len(killed["server"]) + 1

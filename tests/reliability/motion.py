@@ -8,6 +8,7 @@ from pathlib import Path
 from manipnet.demo.performance import DEMO_FILE, DEMO_OBJECTS
 from manipnet.objects.library import LIBRARY_FOLDER
 from manipnet.objects.shape import load_shape
+from manipnet.recording import RecordingWriter
 from manipnet.streams.bodies import BodyFrame
 from manipnet_tools.bench.performances import Performance, actor_config, actor_names, endless
 from manipnet_tools.replay import resample, take_frames
@@ -34,6 +35,15 @@ def frames(performance: Performance, seconds: float, actors: int = 1) -> Iterato
         if frame.t_s > seconds:
             return
         yield frame
+
+
+def recording(performance: Performance, folder: Path) -> Path:
+    """The performance forth and back, so that it can be looped, as a file that is read in no time."""
+    path = folder / "motion.mcap"
+    with RecordingWriter(path, {}) as writer:
+        for frame in frames(performance, 2.0 * (len(performance.frames) - 1) / performance.rate_hz - 1e-6):
+            writer.write_bodies(frame, round(1e9 * frame.t_s))
+    return path
 
 
 def rig_file(performance: Performance, actors: int, folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""People around a server as processes of their own, which can be stopped and killed: `python -m … ROLE ADDRESS [N]`.
+"""People around a server as processes of their own, which can be stopped and killed: `python -m … ROLE ADDRESS …`.
 
 `perform` sends bodies, its time from zero, and goes on whatever becomes of the server. `look` is the Python client; it
 prints a line for each connection, each session, and whenever live hands come or stop coming. `crowd` is N subscribers
@@ -13,14 +13,13 @@ from pathlib import Path
 
 import zmq
 
-from manipnet.streams.player import PlayError, play
+from manipnet.recording import read_bodies
+from manipnet.streams.player import PlayError, looped, play
 from manipnet.streams.wire import TOPIC_MSGPACK
 
 from .live import zmq_sender
-from .motion import frames, motion
 
 ROOT = Path(__file__).parents[2]
-RATE_HZ = 120.0
 AGAIN_S, FRESH_S = 0.05, 0.1
 
 
@@ -35,9 +34,9 @@ def say(*words: object) -> None:
     print(f"{time.monotonic():.6f}", *words, flush=True)
 
 
-def perform(address: str) -> None:
-    """Frames for ever."""
-    performance = motion(RATE_HZ)
+def perform(address: str, path: str) -> None:
+    """The frames of a recording, for ever."""
+    recorded = list(read_bodies(path))
     say("loaded")
     while True:
         try:
@@ -47,7 +46,7 @@ def perform(address: str) -> None:
             continue
         say("connected")
         try:
-            play(frames(performance, float("inf")), sender)
+            play(looped(recorded), sender)
         except PlayError:
             sender.close()
 
