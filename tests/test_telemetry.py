@@ -1,7 +1,10 @@
 """Counters with closed labels, timings, the log that cannot be flooded, and where frames wait."""
 
 import ast
+import json
 import logging
+import re
+import sys
 import threading
 from pathlib import Path
 
@@ -11,6 +14,7 @@ from manipnet.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.status import SilenceWatch
 from manipnet.streams.bodies import BodyFrame
 from manipnet.telemetry import LABELS, Counters, RateLimit, Timings
+from manipnet.terminal import Terminal
 from manipnet.timeline import BodyHealth
 
 SOURCES = sorted((Path(__file__).parents[1] / "server").rglob("*.py"))
@@ -82,6 +86,22 @@ def test_a_line_that_repeats_is_held_back_and_summed_up() -> None:
     assert shown == ["lost a frame", "lost a frame (and 4 more like it)", "lost a frame (and 4 more like it)"]
     assert limit.filter(record("another"))
     assert all(limit.filter(record("news", logging.INFO)) for _ in range(3))
+
+
+def test_a_log_line_as_json_has_its_parts(capsys: pytest.CaptureFixture[str]) -> None:
+    terminal = Terminal(as_json=True)
+    for dropped in (3, 4):
+        terminal.handle(logging.LogRecord("manipnet.x", logging.WARNING, __file__, 1, "lost %d\n", (dropped,), None))
+    try:
+        raise ValueError("ouch")
+    except ValueError:
+        failed = logging.LogRecord("manipnet.x", logging.ERROR, __file__, 1, "failed", (), sys.exc_info())
+    terminal.handle(failed)
+    terminal.close()
+    lost, broken = map(json.loads, capsys.readouterr().err.splitlines())
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", lost.pop("time"))
+    assert lost == {"level": "warning", "logger": "manipnet.x", "event": "lost %d\n", "message": "lost 3\n"}
+    assert broken["exception"].endswith("ValueError: ouch")
 
 
 def a_frame(t_s: float) -> BodyFrame:

@@ -82,6 +82,10 @@ def build_parser() -> argparse.ArgumentParser:
     also = parser.add_argument_group("what else it sends")
     also.add_argument("--vmc", metavar="HOST[:39539]", help="VMC bones, OSC over UDP")
     also.add_argument("--livelink", metavar="HOST[:54321]", help="Unreal's JSON Live Link, UDP")
+    also.add_argument("--takes", type=Path, metavar="FOLDER", help="folder of the recordings (default: takes)")
+    also.add_argument(
+        "--log-format", choices=("text", "json"), default="text", help="of the log on standard error (%(default)s)"
+    )
     also.add_argument("--dump-dir", type=Path, metavar="FOLDER", help="where frames go that led to an internal error")
     return parser
 
@@ -99,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from manipnet.terminal import Terminal
 
     stop = _stop_on_signals()
-    terminal = Terminal()
+    terminal = Terminal(as_json=arguments.log_format == "json")
     logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
     try:
         config = configure(arguments)

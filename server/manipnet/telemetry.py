@@ -167,6 +167,7 @@ class RateLimit(logging.Filter):
             self._last[key] = (shown_at, held_back + 1)
             return False
         self._last[key] = (now, 0)
+        record.event = record.msg
         if held_back:
             record.msg = f"{record.msg} (and {held_back} more like it)"
         return True

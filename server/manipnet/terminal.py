@@ -1,12 +1,13 @@
 """Lines for the person at the terminal, written by a thread of its own: a stopped terminal must not stop the ticks."""
 
 import contextlib
+import json
 import logging
 import queue
 import sys
 import threading
 import time
-from typing import Final
+from typing import Any, Final
 
 from manipnet.telemetry import RateLimit
 
@@ -14,12 +15,29 @@ WAITING_LINES: Final = 200
 LOG_FORMAT: Final = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 
 
+class JsonFormatter(logging.Formatter):
+    """One JSON object a line: `time` (UTC), `level`, `logger`, `message`, and `event`, the message's constant part."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The record as JSON text."""
+        line: dict[str, Any] = {
+            "time": f"{time.strftime('%Y-%m-%dT%H:%M:%S', time.gmtime(record.created))}.{int(record.msecs):03d}Z",
+            "level": record.levelname.lower(),
+            "logger": record.name,
+            "event": getattr(record, "event", record.msg),
+            "message": record.getMessage(),
+        }
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line, ensure_ascii=False, default=str)
+
+
 class Terminal(logging.Handler):
     """Writes `say` to standard output and log records to standard error; drops lines nobody reads."""
 
-    def __init__(self) -> None:
+    def __init__(self, as_json: bool = False) -> None:
         super().__init__()
-        self.setFormatter(logging.Formatter(LOG_FORMAT))
+        self.setFormatter(JsonFormatter() if as_json else logging.Formatter(LOG_FORMAT))
         self.addFilter(RateLimit(time.monotonic))
         self._lines: queue.Queue[tuple[str, bool] | None] = queue.Queue(WAITING_LINES)
         self._thread = threading.Thread(target=self._write, name="terminal", daemon=True)
