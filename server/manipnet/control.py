@@ -13,11 +13,15 @@ import zmq
 
 from manipnet.publisher import bind
 from manipnet.streams.gatekeeper import Gatekeeper
+from manipnet.streams.guard import Pace
 from manipnet.streams.keys import ServerKeys
 from manipnet.streams.zmq_bodies import zmq_endpoint
 from manipnet.telemetry import CONTROL_OPS, Counters
 
 MAX_REQUEST_BYTES: Final = 4096
+REQUESTS_PER_S: Final = 200
+BURST: Final = 50
+"""Of all clients together; beyond it answers take longer, for most requests cost the hands some of their time."""
 _OPS: Final = tuple(op for op in CONTROL_OPS if op != "invalid")
 _log = logging.getLogger(__name__)
 
@@ -41,7 +45,7 @@ class Control:
         keys: ServerKeys | None = None,
     ) -> None:
         """Binds; raises `ListenError`. `start` begins to answer. With `keys` only clients on their list may ask."""
-        self._handlers, self._counters = handlers, counters
+        self._handlers, self._counters, self._pace = handlers, counters, Pace(REQUESTS_PER_S, BURST)
         endpoint, ipv6 = zmq_endpoint(host, port)
         self._context = zmq.Context()
         rep = self._context.socket(zmq.REP)
@@ -84,6 +88,7 @@ class Control:
                 try:
                     frames = rep.recv_multipart(copy=False)
                     self._gatekeeper.connections.delivered(frames[0].get(zmq.SRCFD))
+                    time.sleep(self._pace.delay_s(time.monotonic()))
                     rep.send(self.answer([frame.bytes for frame in frames]))
                 except zmq.ContextTerminated:
                     return

@@ -1,6 +1,6 @@
 """The guard against floods, with a clock that is stepped by hand."""
 
-from manipnet.streams.guard import FAULTS_PER_S, MAX_SOURCES, STRANGERS_PER_S, SourceGuard
+from manipnet.streams.guard import FAULTS_PER_S, MAX_SOURCES, STRANGERS_PER_S, Pace, SourceGuard
 
 
 def test_a_known_source_passes_through_any_flood():
@@ -56,3 +56,22 @@ def test_memory_is_bounded():
         guard.bad(-n)
     assert len(guard._known) <= MAX_SOURCES
     assert len(guard._faults) <= MAX_SOURCES
+
+
+def test_a_known_source_may_be_read_so_often_a_second_and_takes_nothing_from_others():
+    guard = SourceGuard(known_per_s=1_000)
+    for source in ("mad", "sane"):
+        guard.admits(source, 0.0)
+        guard.good(source)
+    for second in range(3):
+        assert sum(guard.admits("mad", second + n / 50_000) for n in range(50_000)) <= 1_000
+        assert all(guard.admits("sane", second + 0.9) for _ in range(360))
+
+
+def test_a_pace_lets_a_burst_through_and_then_so_many_a_second():
+    pace, now = Pace(per_s=100, burst=10), 5.0
+    assert [pace.delay_s(now) for _ in range(10)] == [0.0] * 10
+    for _ in range(200):
+        now += pace.delay_s(now)
+    assert 5.0 + 1.9 < now < 5.0 + 2.1
+    assert [pace.delay_s(now + 1.0) for _ in range(10)] == [0.0] * 10

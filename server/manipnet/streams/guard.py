@@ -5,6 +5,8 @@ from collections.abc import Sequence
 
 STRANGERS_PER_S = 500
 FAULTS_PER_S = 50
+KNOWN_PER_S = 4_000
+"""More than 360 frames a second in ten pieces each: no sender that is well sends so much."""
 MAX_SOURCES = 256
 Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
@@ -14,11 +16,13 @@ class SourceGuard:
 
     A source is known after its first good message and forgotten when it sends more than `FAULTS_PER_S` bad
     ones within a second, so a flood costs one look-up a message and cannot crowd out a stream that works. A
-    stranger with as many faults gets no more of the strangers' budget until the second is over. Pure: the
-    clock is an argument.
+    stranger with as many faults gets no more of the strangers' budget until the second is over. Nor is a known
+    source read more than `known_per_s` times a second, however good its messages. Pure: the clock is an argument.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, known_per_s: int = KNOWN_PER_S) -> None:
+        self._known_per_s = known_per_s
+        self._read: dict[object, int] = {}
         self._known: dict[object, None] = {}
         self._faults: dict[object, int] = {}
         self._strangers = 0
@@ -30,8 +34,10 @@ class SourceGuard:
             self._window_s = now_s
             self._strangers = 0
             self._faults.clear()
+            self._read.clear()
         if source in self._known:
-            return True
+            self._read[source] = self._read.get(source, 0) + 1
+            return self._read[source] <= self._known_per_s
         if self._strangers >= STRANGERS_PER_S or self._faults.get(source, 0) >= FAULTS_PER_S:
             return False
         self._strangers += 1
@@ -50,6 +56,19 @@ class SourceGuard:
             self._faults[source] = self._faults.get(source, 0) + 1
         if self._faults.get(source, 0) >= FAULTS_PER_S:
             self._known.pop(source, None)
+
+
+class Pace:
+    """How long to wait so that no more than `per_s` things are done in a second, after a first `burst`. Pure."""
+
+    def __init__(self, per_s: float, burst: int) -> None:
+        self._period_s, self._credit_s = 1.0 / per_s, burst / per_s
+        self._next_s = float("-inf")
+
+    def delay_s(self, now_s: float) -> float:
+        """Seconds to wait before the next thing, which is counted as done."""
+        self._next_s = max(self._next_s, now_s - self._credit_s) + self._period_s
+        return max(self._next_s - now_s, 0.0)
 
 
 class AllowList:

@@ -12,8 +12,10 @@ from manipnet.streams.udp import Address, UdpThread, bind_udp
 from manipnet.telemetry import Counters
 
 MAX_SENDERS = 16
+DATAGRAMS_PER_S = 20_000
+"""Of one sender: loose messages make three datagrams of a body."""
 IDLE_S = 0.1
-_FLOOD = "more datagrams than can be read from senders unknown so far"
+_FLOOD = "more datagrams than are read, of one sender or of those unknown so far"
 
 
 class OscBodies:
@@ -31,7 +33,7 @@ class OscBodies:
         allow: Sequence[Network] | None = None,
     ) -> None:
         self._intake = Intake("osc", sink, counters)
-        self._guard = SourceGuard()
+        self._guard = SourceGuard(DATAGRAMS_PER_S)
         self._allowed = AllowList(allow)
         self._host, self._port = host, port
         self._assemblers: dict[Address, FrameAssembler] = {}
