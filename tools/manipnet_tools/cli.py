@@ -82,6 +82,18 @@ VERBS = {
         "TrainOptions",
         ("--data DATASET --out models/mine",),
     ),
+    "ablate": Verb(
+        "train and judge the rows of the paper's Table 1",
+        "manipnet_tools.ablate",
+        "AblateOptions",
+        ("--data DATASET --out ablation                both protocols, 49 short trainings",),
+    ),
+    "quantise": Verb(
+        "write a bundle again with 8-bit weights",
+        "manipnet_tools.compress",
+        "QuantiseOptions",
+        ("manipnet-full --out models/manipnet-full-int8",),
+    ),
     "bench": Verb(
         "measure how long a tick takes, stage by stage",
         "manipnet_tools.bench",

@@ -1,11 +1,17 @@
 """Smaller model files: half-precision weights that are cast on load, and 8-bit weights."""
 
+import hashlib
+import json
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
+from tyro.conf import Positional
+
+from manipnet.network.bundle import load_bundle
 
 _LEAST_VALUES = 4096
 """Smaller tensors (biases, normalisation) keep full precision."""
@@ -55,3 +61,31 @@ def quantise_weights(content: bytes) -> bytes:
         source.write_bytes(content)
         quantize_dynamic(source, target, weight_type=QuantType.QInt8, per_channel=True)
         return target.read_bytes()
+
+
+@dataclass(frozen=True)
+class QuantiseOptions:
+    """Write a bundle again with 8-bit weights: half the size, and faster where the network is wide.
+
+    Example: manipnet quantise manipnet-full --out models/manipnet-full-int8
+    """
+
+    model: Positional[str]
+    """Bundle, by shipped name or folder."""
+    out: Path
+    """Folder of the bundle to write."""
+
+
+def run(options: QuantiseOptions) -> None:
+    """Quantise a bundle. Raises `BundleError`."""
+    bundle = load_bundle(options.model)
+    source = (bundle.folder / "manipnet.onnx").read_bytes()
+    content = quantise_weights(single_precision(source))
+    meta = {
+        **bundle.meta,
+        "model_sha256": hashlib.sha256(content).hexdigest(),
+        "quantised_from_sha256": hashlib.sha256(source).hexdigest(),
+    }
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / "manipnet.onnx").write_bytes(content)
+    (options.out / "bundle.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")

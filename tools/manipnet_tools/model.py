@@ -1,6 +1,7 @@
 """ManipNet as a torch module (paper, section 6.2), with its normalisation inside, and its export to ONNX."""
 
 import io
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -174,7 +175,10 @@ def export_onnx(model: ManipNet) -> bytes:
     """The model as ONNX with dynamic batch, `features` in and `outputs` out, weights in single precision."""
     model = model.eval().float()
     buffer = io.BytesIO()
-    with torch.no_grad():
+    with torch.no_grad(), warnings.catch_warnings():
+        # the older exporter is chosen on purpose: it needs no further package
+        warnings.simplefilter("ignore", DeprecationWarning)
+        warnings.filterwarnings("ignore", "Constant folding")
         torch.onnx.export(
             model,
             (torch.zeros(2, INPUT_SIZE),),

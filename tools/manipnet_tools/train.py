@@ -86,44 +86,123 @@ def spans_of(tracks: Sequence[HandTrack], share: float) -> list[tuple[int, int]]
     return [(FUTURE_FRAMES, int(len(track) * share) - FUTURE_FRAMES) for track in tracks]
 
 
+class Learner:
+    """One model in training: `learn` from samples, round by round, at a falling rate."""
+
+    def __init__(self, first: Samples, config: TrainConfig) -> None:
+        """`first` samples give the normalisation."""
+        norm = normalisation(first.inputs, first.outputs, config.carries_pose)
+        self._config = config
+        self._rng = np.random.default_rng(config.seed)
+        self._last = ManipNet(norm, config.width, config.dropout, config.architecture, config.hidden)
+        self._average = torch.optim.swa_utils.AveragedModel(
+            self._last, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.average)
+        )
+        self._optimizer = torch.optim.AdamW(
+            self._last.parameters(), config.learning_rate, weight_decay=config.weight_decay, fused=True
+        )
+        total = config.rounds * config.epochs_per_round
+        self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(self._optimizer, total, config.learning_rate / 50)
+
+    @property
+    def model(self) -> ManipNet:
+        """What would be shipped now."""
+        return cast(ManipNet, self._average.module) if self._config.average else self._last
+
+    def learn(self, samples: Samples) -> float:
+        """One round's epochs; returns the last one's loss."""
+        loss = float("nan")
+        for _ in range(self._config.epochs_per_round):
+            loss = self._epoch(samples)
+            self._schedule.step()
+        return loss
+
+    def _epoch(self, samples: Samples) -> float:
+        self._last.train()
+        batch, order, losses = self._config.batch, self._rng.permutation(len(samples)), []
+        for start in range(0, len(order) - batch + 1, batch):
+            rows = order[start : start + batch]
+            inputs, outputs = torch.from_numpy(samples.inputs[rows]), torch.from_numpy(samples.outputs[rows])
+            with torch.autocast("cpu", torch.bfloat16):
+                predicted = self._last.normalised(inputs).float()
+            loss = (predicted - self._last.normalise_outputs(inputs, outputs)).square().mean()
+            self._optimizer.zero_grad(set_to_none=True)
+            loss.backward()
+            self._optimizer.step()
+            self._average.update_parameters(self._last)
+            losses.append(float(loss.detach()))
+        return float(np.mean(losses))
+
+
+class Lessons:
+    """Samples of some takes, made anew for every round."""
+
+    def __init__(self, tracks: Sequence[HandTrack], config: TrainConfig, share: float) -> None:
+        """The first `share` of every track is used."""
+        self._spans = spans_of(tracks, share)
+        self._tracks, self._config = list(tracks), config
+        self._rng = np.random.default_rng(config.seed)
+        seen = [track.angles[low:high:4] for track, (low, high) in zip(tracks, self._spans, strict=True)]
+        self._pool = np.concatenate(seen)
+        self.limits = pose_limits(self._pool)
+        self.rest_angles = np.clip(self._pool.mean(axis=0), self.limits[:, 0], self.limits[:, 1])
+        if config.backwards:
+            self._spans += [
+                (len(track) - high, len(track) - low) for track, (low, high) in zip(tracks, self._spans, strict=True)
+            ]
+            self._tracks += [track.backwards() for track in tracks]
+
+    def next_round(self, model: ManipNet | None) -> Samples:
+        """Captured and blended poses and, given a model, poses of its own making."""
+        config, rng = self._config, self._rng
+        lag_ticks = (1.0 - config.response) / config.response
+        lesson = Lesson(config.kept, TICK_FRAMES * lag_ticks, config.response)
+        parts = []
+        for track, (low, high) in zip(self._tracks, self._spans, strict=True):
+            for share, towards in ((config.captured, None), (config.blended, self._pool)):
+                if share:
+                    frames = rng.integers(low, high, int(share * (high - low)))
+                    parts.append(captured_samples(track, frames, towards, lesson, self.limits, rng, config.warp))
+        if model is not None and config.self_made:
+            parts.append(self._self_made(model, lesson))
+        return concatenate(parts)
+
+    def _self_made(self, model: ManipNet, lesson: Lesson) -> Samples:
+        config = self._config
+        wanted = config.self_made * np.mean([high - low for low, high in self._spans])
+        starts = max(int(wanted / config.roll_out_ticks), 1)
+        policy = policy_of(model, self.limits)
+        return self_made_samples(
+            self._tracks, self._spans, policy, starts, config.roll_out_ticks, lesson, self._pool, self.limits, self._rng
+        )
+
+
 def train(tracks: Sequence[HandTrack], config: TrainConfig, share: float = 1.0) -> Trained:
     """Train on the first `share` of each track. Deterministic for a seed, on one thread: with the small batches that
     train best, a second thread waits more than it works."""
     started = time.monotonic()
-    takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
-    spans = spans_of(tracks, share)
-    if config.backwards:
-        spans += [(len(track) - high, len(track) - low) for track, (low, high) in zip(tracks, spans, strict=True)]
-        tracks = [*tracks, *(track.backwards() for track in tracks)]
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
-    rng = np.random.default_rng(config.seed)
-    pool = np.concatenate([track.angles[low:high:4] for track, (low, high) in zip(tracks, spans, strict=True)])
-    limits = pose_limits(pool)
-    rest = np.clip(pool.mean(axis=0), limits[:, 0], limits[:, 1])
-    first = _make(tracks, spans, config, pool, limits, rng, None)
-    norm = normalisation(first.inputs, first.outputs, config.carries_pose)
-    model = ManipNet(norm, config.width, config.dropout, config.architecture, config.hidden)
-    average = torch.optim.swa_utils.AveragedModel(
-        model, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.average)
-    )
-    optimizer = torch.optim.AdamW(
-        model.parameters(), config.learning_rate, weight_decay=config.weight_decay, fused=True
-    )
-    total = config.rounds * config.epochs_per_round
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, total, config.learning_rate / 50)
+    lessons = Lessons(tracks, config, share)
+    samples = lessons.next_round(None)
+    learner = Learner(samples, config)
     for turn in range(config.rounds):
-        policy = None if turn == 0 else policy_of(cast(ManipNet, average.module), limits)
-        samples = first if turn == 0 else _make(tracks, spans, config, pool, limits, rng, policy)
-        for _ in range(config.epochs_per_round):
-            loss = _epoch(model, average, optimizer, samples, config.batch, rng)
-            schedule.step()
+        if turn:
+            samples = lessons.next_round(learner.model)
+        loss = learner.learn(samples)
         _log.info(
             "round %d/%d  %d samples  loss %.4f  %.0f s",
             turn + 1, config.rounds, len(samples), loss, time.monotonic() - started,
         )  # fmt: skip
-    shipped = cast(ManipNet, average.module) if config.average else model
-    return Trained(shipped.eval(), rest, limits, config, takes, share, time.monotonic() - started)
+    return trained(learner, lessons, tracks, config, share, time.monotonic() - started)
+
+
+def trained(
+    learner: Learner, lessons: Lessons, tracks: Sequence[HandTrack], config: TrainConfig, share: float, seconds: float
+) -> Trained:
+    """What has been learned, ready to be saved."""
+    takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
+    return Trained(learner.model.eval(), lessons.rest_angles, lessons.limits, config, takes, share, seconds)
 
 
 def pose_limits(angles: Array) -> Array:
@@ -142,43 +221,6 @@ def policy_of(model: ManipNet, limits: Array):
         return angles_from_outputs(outputs.double().numpy(), limits)
 
     return policy
-
-
-def _make(tracks, spans, config: TrainConfig, pool: Array, limits: Array, rng, policy) -> Samples:
-    """One round's samples: captured, blended and, with a policy, self-made poses."""
-    lag_ticks = (1.0 - config.response) / config.response
-    lesson = Lesson(config.kept, TICK_FRAMES * lag_ticks, config.response)
-    parts = []
-    for track, (low, high) in zip(tracks, spans, strict=True):
-        for share, towards in ((config.captured, None), (config.blended, pool)):
-            if share:
-                frames = rng.integers(low, high, int(share * (high - low)))
-                parts.append(captured_samples(track, frames, towards, lesson, limits, rng, config.warp))
-    if policy is not None and config.self_made:
-        wanted = config.self_made * np.mean([high - low for low, high in spans])
-        starts = max(int(wanted / config.roll_out_ticks), 1)
-        parts.append(self_made_samples(tracks, spans, policy, starts, config.roll_out_ticks, lesson, pool, limits, rng))
-    return concatenate(parts)
-
-
-def _epoch(model, average, optimizer, samples: Samples, batch: int, rng) -> float:
-    model.train()
-    order = rng.permutation(len(samples))
-    losses = []
-    for start in range(0, len(order) - batch + 1, batch):
-        rows = order[start : start + batch]
-        inputs, outputs = torch.from_numpy(samples.inputs[rows]), torch.from_numpy(samples.outputs[rows])
-        with torch.autocast("cpu", torch.bfloat16):
-            predicted = model.normalised(inputs).float()
-        target = model.normalise_outputs(inputs, outputs)
-        error = predicted - target
-        loss = (error * error).mean()
-        optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        optimizer.step()
-        average.update_parameters(model)
-        losses.append(float(loss.detach()))
-    return float(np.mean(losses))
 
 
 def save_bundle(trained: Trained, folder: Path) -> None:
