@@ -18,7 +18,7 @@ LAYERS = (
     ("presence", "output_guard", "config", "rig_source", "rig", "rig_file", "keys", "calibration"),
     ("props", "actor", "page"),
     ("mailbox", "messages", "flight_recorder", "publisher", "control", "status", "metrics", "terminal", "diagnosis"),
-    ("requests", "tick_loop", "doctor"),
+    ("requests", "placing", "tick_loop", "doctor"),
     ("warm_up", "demo"),
     ("server",),
     ("cli",),

@@ -153,7 +153,7 @@ def test_the_size_of_a_hand_is_measured_by_a_touch_of_its_fingertip(side: Side, 
     offset = calibrate_wrist(side, steady_pose(held(flat), "it"), HERE, 1.0)
     back = wrist_on_sheet(side, scale) + np.array([0.0, 0.0, scale * HAND_LENGTH_M - MARK_M[1], 0, 0, 0, 0])
     touching = compose(compose(HERE, back), invert(T_cluster_wrist))
-    wrist = steady_pose(compose(held(touching, 1), offset), "it")
+    wrist = compose(steady_pose(held(touching, 1), "it").pose, offset)
     found = measured_length(side, wrist, HERE) / HAND_LENGTH_M
     assert found == pytest.approx(scale, abs=0.01)
     away_m, _ = difference(scaled_offset(offset, 1.0, found), T_cluster_wrist)
@@ -168,7 +168,7 @@ def test_a_touch_elsewhere_is_refused(x: float, z: float, complaint: str) -> Non
     T_sheet_wrist = wrist_on_sheet("right")
     T_sheet_wrist[[0, 2]] = x, z
     with pytest.raises(CalibrationError, match=complaint):
-        measured_length("right", steady_pose(held(compose(HERE, T_sheet_wrist)), "it"), HERE)
+        measured_length("right", compose(HERE, T_sheet_wrist), HERE)
 
 
 @given(yaw=st.floats(-3.0, 3.0), where=points)

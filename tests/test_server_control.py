@@ -12,8 +12,9 @@ from live_server import Stage, scene
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
 from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.objects.library import library_names, load_library_mesh
+from manipnet.telemetry import CONTROL_OPS
 
-OPS = "hello, ping, status, objects, mesh, select_object, look_ahead, rest"
+OPS = ", ".join(op for op in CONTROL_OPS if op != "invalid")
 
 
 @pytest.mark.parametrize("as_json", [True, False])
@@ -57,10 +58,15 @@ def test_the_mesh_that_a_body_carries_can_be_had(stage: Stage) -> None:
     assert "allowed are Box" in stage.server.ask({"op": "mesh", "body": "Cup"})["error"]
 
 
+def carried(stage: Stage) -> tuple[str, float]:
+    box = stage.server.ask({"op": "objects"})["bodies"]["actor"]["Box"]
+    return box["object"], box["scale"]
+
+
 def test_an_object_is_swapped_while_the_hands_are_on_it(stage: Stage) -> None:
     for name in ("sphere", "cube"):  # both built once, which may take a while
         stage.server.ask({"op": "select_object", "body": "Box", "object": name})
-    assert stage.server.ask({"op": "objects"})["bodies"]["actor"]["Box"] == {"object": "cube", "scale": 1.0}
+    assert carried(stage) == ("cube", 1.0)
     swapped = {}
 
     def poses(t_s: float):
@@ -69,10 +75,12 @@ def test_an_object_is_swapped_while_the_hands_are_on_it(stage: Stage) -> None:
         return scene(t_s)
 
     messages = stage.perform(1.0, poses)
+    first_shown = swapped.pop("seq")
     assert swapped == {"actor": "actor", "body": "Box", "object": "sphere", "scale": 0.8}
+    assert messages[0].seq < first_shown < messages[-1].seq
     assert len(messages) == 61
     assert {hand.object for m in messages for hand in m.hands.values()} == {"Box"}
-    assert stage.server.ask({"op": "objects"})["bodies"]["actor"]["Box"] == {"object": "sphere", "scale": 0.8}
+    assert carried(stage) == ("sphere", 0.8)
     stage.server.ask({"op": "select_object", "body": "Box", "object": "cube"})
 
 

@@ -94,6 +94,8 @@ class Actor:
         self.timeline = Timeline(look_ahead_s)
         self.props = list(props)
         self.seq = 0
+        self.paused = False
+        """Asked to pause: both hands stay as they are shown, wherever the wrists go."""
         limits = _limits(config, bundle.limits)
         rest_angles = np.clip(bundle.rest_angles, *limits.T)
         self.hands: dict[Side, Hand] = {
@@ -188,7 +190,7 @@ class Actor:
         hands: dict[Side, ShownHand] = {}
         for side, hand in self.hands.items():
             wrist = plan.tick.bodies.get(f"{side}_wrist")
-            tracked = wrist is not None and (wrist.age_s <= HOLD_AFTER_S)
+            tracked = wrist is not None and wrist.age_s <= HOLD_AFTER_S and not self.paused
             pose = wrist.pose if wrist is not None and (tracked or hand.shown is None) else None
             shown = hand.show(plan.states[side], steps.get(side), pose, plan.tick.run, dt_s)
             if shown is not None:
@@ -217,6 +219,8 @@ class Actor:
             hand.recover()
 
     def _state(self, hand: Hand, wrist: BodyAtTick | None, thing: BodyAtTick | None) -> State:
+        if self.paused:
+            return "hold"
         if hand.resting:
             hand.resting = not hand.at_rest()
             return "rest"

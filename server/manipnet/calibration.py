@@ -35,6 +35,7 @@ MARK_M: Final = (0.12, 0.10)
 HAND_LENGTH_RANGE_M: Final = (0.12, 0.28)
 
 MIN_SAMPLES: Final = 20
+TRACKED_SHARE: Final = 0.7
 OUTLIER_SHARE: Final = 0.2
 MAX_SPREAD_M, MAX_SPREAD_RAD = 0.003, np.radians(2.0)
 """RMS about the mean."""
@@ -70,14 +71,17 @@ class Steady:
         return max(self.spread_m, self.drift_m) <= GOOD_M and max(self.spread_rad, self.drift_rad) <= GOOD_RAD
 
 
-def steady_pose(poses: Array, name: str) -> Steady:
+def steady_pose(poses: Array, name: str, expected: float = MIN_SAMPLES) -> Steady:
     """Mean of the poses `(n, 7)` of the body `name`, rising in time, without those that do not belong.
 
-    Raises `CalibrationError` for too few samples, too many outliers, and a body that moved.
+    Raises `CalibrationError` for too few samples (of those `expected` in that time), too many outliers, and a body
+    that moved.
     """
-    if len(poses) < MIN_SAMPLES:
+    least = max(MIN_SAMPLES, int(TRACKED_SHARE * expected))
+    if len(poses) < least:
         raise CalibrationError(
-            f"{name}: {len(poses)} tracked samples in that time, {MIN_SAMPLES} are the least; see that it is tracked"
+            f"{name}: {len(poses)} tracked samples in that time, {least} are the least; see that it is tracked, and "
+            "hold it still for all of that time"
         )
     mean, kept = _robust_mean(poses)
     outliers = len(poses) - int(kept.sum())
@@ -160,12 +164,12 @@ def scaled_offset(T_cluster_wrist: Array, scale_before: float, scale: float) -> 
     return compose(T_cluster_wrist, higher)
 
 
-def measured_length(side: Side, wrist: Steady, T_world_sheet: Array) -> float:
+def measured_length(side: Side, T_world_wrist: Array, T_world_sheet: Array) -> float:
     """Length of a hand whose middle finger's tip touches its line's end at the sheet's centre line, metres.
 
-    `wrist` is the calibrated wrist's frame in the world. Raises `CalibrationError` where that cannot be.
+    `T_world_wrist (7,)` is the calibrated wrist. Raises `CalibrationError` where that cannot be.
     """
-    T_sheet_wrist = compose(invert(T_world_sheet), wrist.pose)
+    T_sheet_wrist = compose(invert(T_world_sheet), T_world_wrist)
     mark_x = MARK_M[0] if side == "right" else -MARK_M[0]
     toward = np.array([1.0, 0.0, 0.0]) if side == "right" else np.array([-1.0, 0.0, 0.0])
     fingers = quat_rotate(T_sheet_wrist[3:], toward)

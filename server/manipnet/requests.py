@@ -10,6 +10,7 @@ from manipnet import __version__
 from manipnet.actor import Actor
 from manipnet.config import SCALE_RANGE
 from manipnet.control import Handler, Request, RequestError, choice, number, ping
+from manipnet.geometry import Array
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
 from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.mailbox import BusyError, Mailbox
@@ -23,6 +24,33 @@ from manipnet.timeline import MAX_LOOK_AHEAD_S, TICK_HZ
 T = TypeVar("T")
 
 
+class Cast:
+    """The actors of a server as other threads may have them: between two ticks."""
+
+    def __init__(self, actors: Sequence[Actor], mailbox: Mailbox) -> None:
+        self.actors, self._mailbox = actors, mailbox
+
+    def actor(self, request: Request) -> Actor:
+        """Whom a request is about, the first unless it says; raises `RequestError`."""
+        names = tuple(actor.config.name for actor in self.actors)
+        return self.actors[names.index(choice(request, "actor", names, default=names[0]))]
+
+    def ask(self, question: Callable[[], T]) -> T:
+        """The answer of the tick thread; raises `RequestError` for a `ValueError`, and when there is none."""
+        try:
+            return self._mailbox.ask(question)
+        except (BusyError, ValueError) as error:
+            raise RequestError(str(error)) from None
+
+
+def body_key(request: Request) -> int | str:
+    """The `body` of a request; raises `RequestError`."""
+    body = request.get("body")
+    if isinstance(body, bool) or not isinstance(body, int | str) or not 0 < len(str(body)) <= 128:
+        raise RequestError("body is missing or no name; give the streaming id or name of a body")
+    return body
+
+
 class Requests:
     """The operations of `docs/protocol.md`, Control."""
 
@@ -31,14 +59,13 @@ class Requests:
         session: str,
         model: str,
         model_hash: str,
-        actors: Sequence[Actor],
+        cast: Cast,
         wardrobe: Wardrobe,
-        mailbox: Mailbox,
         counters: Counters,
         timings: Timings,
     ) -> None:
         self._session, self._model, self._model_hash = session, model, model_hash
-        self._actors, self._wardrobe, self._mailbox = actors, wardrobe, mailbox
+        self._cast, self._actors, self._wardrobe = cast, cast.actors, wardrobe
         self._counters, self._timings = counters, timings
         self._started_s = time.monotonic()
 
@@ -53,6 +80,7 @@ class Requests:
             "select_object": self._select_object,
             "look_ahead": self._look_ahead,
             "rest": self._rest,
+            "pause": self._pause,
         }
 
     def _hello(self, _: Request) -> dict[str, Any]:
@@ -72,19 +100,21 @@ class Requests:
 
     def _status(self, _: Request) -> dict[str, Any]:
         now_s = time.monotonic()
-        report = self._ask(lambda: status(self._actors, self._counters, self._timings, now_s))
+        report = self._cast.ask(lambda: status(self._actors, self._counters, self._timings, now_s))
         return {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s, **report}
 
     def _objects(self, _: Request) -> dict[str, Any]:
-        carried = self._ask(lambda: {actor.config.name: list(actor.props) for actor in self._actors})
-        return {
-            "objects": list(self._wardrobe.names()),
-            "bodies": {actor: {prop.name: _prop(prop) for prop in props} for actor, props in carried.items()},
-        }
+        def carried() -> dict[str, Any]:
+            return {
+                actor.config.name: {prop.name: _prop(prop) | placement(actor.offset(prop.name)) for prop in actor.props}
+                for actor in self._actors
+            }
+
+        return {"objects": list(self._wardrobe.names()), "bodies": self._cast.ask(carried)}
 
     def _mesh(self, request: Request) -> dict[str, Any]:
-        actor = self._actor(request)
-        props = {prop.name: prop for prop in self._ask(lambda: list(actor.props))}
+        actor = self._cast.actor(request)
+        props = {prop.name: prop for prop in self._cast.ask(lambda: list(actor.props))}
         prop = props[choice(request, "body", tuple(props))]
         mesh = prop.shape.mesh
         return {
@@ -96,18 +126,16 @@ class Requests:
         }
 
     def _select_object(self, request: Request) -> dict[str, Any]:
-        actor = self._actor(request)
-        body = request.get("body")
-        if isinstance(body, bool) or not isinstance(body, int | str) or not 0 < len(str(body)) <= 128:
-            raise RequestError("body is missing or no name; give the streaming id or name of a body")
+        actor = self._cast.actor(request)
+        body = body_key(request)
         name = choice(request, "object", self._wardrobe.names())
         scale = number(request, "scale", *SCALE_RANGE, default=1.0)
         try:
             shape = self._wardrobe.shape(name)  # may take a second, on this thread
         except MeshError as error:
             raise RequestError(str(error)) from None
-        prop = self._ask(lambda: actor.carry(body, name, shape, scale))
-        return {"actor": actor.config.name, "body": prop.name, **_prop(prop)}
+        prop, seq = self._cast.ask(lambda: (actor.carry(body, name, shape, scale), actor.seq))
+        return {"actor": actor.config.name, "body": prop.name, **_prop(prop), "seq": seq}
 
     def _look_ahead(self, request: Request) -> dict[str, Any]:
         seconds = number(request, "seconds", 0.0, MAX_LOOK_AHEAD_S)
@@ -116,23 +144,31 @@ class Requests:
             for actor in self._actors:
                 actor.timeline.look_ahead_s = seconds
 
-        self._ask(change)
+        self._cast.ask(change)
         return {"seconds": seconds}
 
     def _rest(self, request: Request) -> dict[str, Any]:
-        actors = self._actors if request.get("actor") is None else [self._actor(request)]
-        self._ask(lambda: [actor.rest() for actor in actors])
+        actors = self._actors if request.get("actor") is None else [self._cast.actor(request)]
+        self._cast.ask(lambda: [actor.rest() for actor in actors])
         return {"actors": [actor.config.name for actor in actors]}
 
-    def _actor(self, request: Request) -> Actor:
-        names = tuple(actor.config.name for actor in self._actors)
-        return self._actors[names.index(choice(request, "actor", names, default=names[0]))]
+    def _pause(self, request: Request) -> dict[str, Any]:
+        on = request.get("on", True)
+        if not isinstance(on, bool):
+            raise RequestError(f"on is {on!r:.60}; allowed are true and false")
+        actors = self._actors if request.get("actor") is None else [self._cast.actor(request)]
 
-    def _ask(self, question: Callable[[], T]) -> T:
-        try:
-            return self._mailbox.ask(question)
-        except (BusyError, ValueError) as error:
-            raise RequestError(str(error)) from None
+        def change() -> None:
+            for actor in actors:
+                actor.paused = on
+
+        self._cast.ask(change)
+        return {"actors": [actor.config.name for actor in actors], "paused": on}
+
+
+def placement(offset: Array) -> dict[str, list[float]]:
+    """Where something sits on its body, as a rig file says it."""
+    return {"position": offset[:3].tolist(), "rotation": offset[3:].tolist()}
 
 
 def _prop(prop: Prop) -> dict[str, Any]:

@@ -41,8 +41,8 @@ def server_table(config: ServerConfig) -> dict[str, Any]:
     return {key: _plain(value) for key, value in values.items() if value not in (None, ())}
 
 
-def store(path: Path, actor: ActorConfig) -> Path:
-    """Put where the actor's wrists and props sit, and the size of its hands, into a rig file; returns the backup's
+def store(path: Path, actor: ActorConfig, backup: bool = True) -> Path:
+    """Put where the actor's wrists and props sit, and the size of its hands, into a rig file; returns the `backup`'s
     path. Whatever else is in the file stays as it is, comments too.
 
     Raises `ConfigError`, and the file is as it was.
@@ -53,7 +53,7 @@ def store(path: Path, actor: ActorConfig) -> Path:
         text = before.decode("utf-8-sig")
         after = _with_placements(text, actor)
         _check(after, path, actor)
-        return replace_file(path, after)
+        return replace_file(path, after, backup)
     except (OSError, ValueError, TOMLKitError, KeyError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise ConfigError(
@@ -61,12 +61,11 @@ def store(path: Path, actor: ActorConfig) -> Path:
         ) from (None)
 
 
-def replace_file(path: Path, text: str) -> Path:
-    """Write a file so that at any time either the old or the new one is there whole; the old one is kept beside it.
-
-    Raises `OSError`.
+def replace_file(path: Path, text: str, backup: bool = True) -> Path:
+    """Write a file so that at any time either the old or the new one is there whole; the old one is kept beside it
+    if there is to be a `backup`. Returns the backup's path. Raises `OSError`.
     """
-    backup = path.with_name(path.name + BACKUP_SUFFIX)
+    kept = path.with_name(path.name + BACKUP_SUFFIX)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with open(part, "w", encoding="utf-8", newline="") as file:
@@ -75,11 +74,12 @@ def replace_file(path: Path, text: str) -> Path:
             os.fsync(file.fileno())
         if path.exists():
             shutil.copymode(path, part)
-            shutil.copy2(path, backup)
+            if backup:
+                shutil.copy2(path, kept)
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
-    return backup
+    return kept
 
 
 def _with_placements(text: str, actor: ActorConfig) -> str:

@@ -12,15 +12,16 @@ from platformdirs import user_log_path
 
 from manipnet.actor import Actor
 from manipnet.config import ActorConfig, ConfigError, ServerConfig, check
-from manipnet.control import Control
+from manipnet.control import Control, Handler
 from manipnet.flight_recorder import FlightRecorder
 from manipnet.mailbox import Mailbox
 from manipnet.metrics import MetricsPage
 from manipnet.network.bundle import load_bundle
 from manipnet.page.host import LivePage
+from manipnet.placing import Placing
 from manipnet.props import Wardrobe
 from manipnet.publisher import Publisher
-from manipnet.requests import Requests
+from manipnet.requests import Cast, Requests
 from manipnet.status import SilenceWatch, second_line
 from manipnet.streams.intake import ListenError
 from manipnet.streams.keys import read_server_keys
@@ -93,7 +94,7 @@ class Server:
         config, counters = self._config, self.counters
         publisher = Publisher(config, counters, self._keys)
         opened.callback(publisher.close)
-        control = Control(config.host, config.control_port, self._requests().handlers(), counters, self._keys)
+        control = Control(config.host, config.control_port, self._handlers(), counters, self._keys)
         opened.callback(control.stop)
         control.start()
         page_host = LOOPBACK if self._keys is not None else config.host  # browsers have no keys
@@ -131,17 +132,18 @@ class Server:
             page,
         )
 
-    def _requests(self) -> Requests:
-        return Requests(
+    def _handlers(self) -> dict[str, Handler]:
+        cast = Cast(self._actors, self._mailbox)
+        requests = Requests(
             self.session,
             self._bundle.name,
             self._bundle.model_hash,
-            self._actors,
+            cast,
             self._wardrobe,
-            self._mailbox,
             self.counters,
             self.timings,
         )
+        return {**requests.handlers(), **Placing(cast, self._config.rig).handlers()}
 
     def _zmq_bodies(self) -> ZmqBodies:
         config = self._config
