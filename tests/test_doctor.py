@@ -9,9 +9,13 @@ import pytest
 import zmq
 
 from fake_motive import FakeMotive
-from manipnet import doctor
+from manipnet import doctor, elsewhere
+from manipnet.control import Control
 from manipnet.diagnosis import Heard, SourceHeard, diagnose
+from manipnet.self_report import of_server
 from manipnet.streams.bodies import BodyFrame, BodySample
+from manipnet.streams.keys import make_client_keys, make_server_keys, read_server_keys
+from manipnet.telemetry import Counters
 
 PARTS = {"left_wrist": "left_wrist", "right_wrist": 2}
 
@@ -108,6 +112,50 @@ def test_a_port_in_use(ports, capsys):
     assert "ss -lntup" in said
 
 
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--host=203.0.113.9"], "name an address of this machine: 127.0.0.1"),
+        (["--natnet=127.0.0.1", "--interface=203.0.113.9"], "name an address of this machine: 127.0.0.1"),
+        (["--natnet=192.0.2.1", "--interface=127.0.0.1"], "cannot send to 192.0.2.1"),
+    ],
+)
+def test_a_wrong_interface(ports, capsys, options, says):
+    assert doctor.main([*ports, "--seconds=0.2", *options]) == 1
+    assert says in capsys.readouterr().out
+
+
+def test_packets_for_another_address_of_this_machine(ports, capsys, monkeypatch):
+    monkeypatch.setattr(elsewhere, "own_addresses", lambda: {"127.0.0.1", "127.0.0.2"})
+    osc, bodies = (port(ports, name) for name in ("--osc-port", "--input-port"))
+
+    def send(seconds):
+        with socket.socket(type=socket.SOCK_DGRAM) as udp, socket.create_connection(("127.0.0.2", bodies)):
+            for _ in range(3):
+                udp.sendto(b"whatever", ("127.0.0.2", osc))
+
+    monkeypatch.setattr(doctor, "listen", send)
+    assert doctor.main([*ports]) == 1
+    said = capsys.readouterr().out
+    assert f"3 packets or connections came to 127.0.0.2:{osc}, but the server is to listen on 127.0.0.1" in said
+    assert f"1 packets or connections came to 127.0.0.2:{bodies}" in said
+    assert "start the server with --host 127.0.0.2" in said
+
+
+def test_a_server_with_keys_is_asked_with_one(ports, capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
+    make_server_keys(tmp_path)
+    path = make_client_keys(tmp_path, "stage-pc")
+    handlers = {"status": lambda request: {"counters": {"frames_in": {"osc": 5}}, "actors": {}}}
+    control = Control("127.0.0.1", port(ports, "--control-port"), handlers, Counters(), read_server_keys(tmp_path))
+    control.start()
+    assert doctor.main([*ports, f"--key={path}"]) == 0
+    control.stop()
+    assert "frames that arrived: 5 by osc" in capsys.readouterr().out
+    assert doctor.main([*ports, f"--key={tmp_path / 'none.toml'}"]) == 1
+    assert "none.toml does not exist" in capsys.readouterr().out
+
+
 def test_bodies_that_arrive_are_compared_with_the_rig(ports, capsys):
     stop = threading.Event()
 
@@ -155,7 +203,9 @@ def test_motive_that_does_not_answer(ports, capsys):
     [
         ({}, {}, "nothing arrives at all"),
         ({"frames_in": {"osc": 5}, "frames_dropped": {"unknown_body": 5}}, {}, "5 frames hold no body the rig knows"),
-        ({"frames_in": {"osc": 5}}, {"Box": {"state": "rest"}}, "actor: Box is not tracked at present"),
+        ({"frames_in": {"osc": 5}}, {"Box": {"state": "rest", "age_s": 9}}, "actor: Box is not tracked at present"),
+        ({"frames_in": {"osc": 5}}, {"Box": {"state": "rest", "age_s": None}}, "actor: Box has never been tracked"),
+        ({"frames_in": {"osc": 5}, "frames_dropped": {"kernel": 7}}, {}, "7 dropped as kernel"),
         ({"frames_in": {"osc": 5}}, {"Box": {"state": "live"}}, "frames that arrived: 5 by osc"),
     ],
 )
@@ -174,6 +224,23 @@ def test_a_running_server_is_asked(ports, capsys, monkeypatch, counters, bodies,
         doctor.main([*ports, "--seconds=0"])
         thread.join()
     assert says in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("state", "problem", "says"),
+    [
+        ("connecting", None, "Motive does not answer"),
+        ("connected", None, "answers but streams no frames"),
+        ("silent", None, "has fallen silent"),
+        ("connected", "it speaks Klingon", "NatNet: it speaks Klingon"),
+        ("streaming", None, "Motive, NatNet 3.0 answers; rigid bodies it defines: 1 'Box'"),
+    ],
+)
+def test_a_running_server_tells_of_motive(state, problem, says):
+    motive = {"state": state, "server": "Motive, NatNet 3.0", "bodies": {"1": "Box"}, "problem": problem}
+    findings = of_server({"counters": {"frames_in": {"natnet": 1}}, "natnet": motive}, "here")
+    assert any(says in finding.text for finding in findings)
+    assert any(finding.level == "problem" for finding in findings) == (state != "streaming")
 
 
 def test_a_wrong_rig_file_is_named(ports, tmp_path, capsys):

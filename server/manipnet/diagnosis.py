@@ -72,7 +72,7 @@ class Heard:
 
 def diagnose(heard: Heard, expected: Mapping[str, BodyKey], addresses: Mapping[str, str]) -> list[Finding]:
     """What the stream lacks for the parts `expected` (`{"left_wrist": key}`); `addresses` are what was listened on."""
-    findings = _drops(heard)
+    findings = drops(heard)
     if not heard.sources:
         listened = ", ".join(addresses.values()) or "no port"
         what = "packets arrive, but none that is understood" if heard.dropped else "nothing arrives at all"
@@ -99,7 +99,8 @@ _DROP_REMEDIES: Final = {
 }
 
 
-def _drops(heard: Heard) -> list[Finding]:
+def drops(heard: Heard) -> list[Finding]:
+    """What was dropped, by reason, that somebody can do something about."""
     findings = []
     for reason, remedy in _DROP_REMEDIES.items():
         if count := heard.dropped.get(reason):

@@ -1,8 +1,10 @@
 """`manipnet doctor`: why nothing arrives. Listens where the server would, or asks the server that already does."""
 
 import argparse
+import errno
 import json
 import logging
+import os
 import sys
 import threading
 from collections.abc import Mapping, Sequence
@@ -12,11 +14,14 @@ from typing import Any
 
 import zmq
 
+from manipnet import elsewhere, self_report
 from manipnet.config import WRISTS, ActorConfig, BodyKey, ConfigError, ServerConfig, default_actor, parse_endpoint
 from manipnet.diagnosis import Finding, Heard, SourceHeard, diagnose
 from manipnet.rig import load_rig
 from manipnet.streams.bodies import BodyFrame
+from manipnet.streams.curve import secure_client
 from manipnet.streams.intake import ListenError
+from manipnet.streams.keys import KeyFileError, read_client_keys
 from manipnet.streams.natnet import COMMAND_PORT
 from manipnet.streams.natnet_client import NatNetBodies
 from manipnet.streams.osc import OscBodies
@@ -57,6 +62,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--natnet", metavar="SERVER[:1510]", help="also connect to OptiTrack Motive there")
     parser.add_argument("--multicast", action="store_true", help="Motive streams by multicast")
     parser.add_argument("--interface", metavar="ADDRESS", help="address of the network card that faces Motive")
+    parser.add_argument("--key", type=Path, metavar="FILE", help="a client's keys, to ask a server that wants some")
     parser.add_argument("--seconds", type=float, default=5.0, help="how long to listen (%(default)s)")
     return parser
 
@@ -66,8 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = build_parser().parse_args(argv)
     try:
         findings = examine(options)
-    except ConfigError as error:
-        findings = [Finding("problem", str(error), "mend the rig file or the option")]
+    except (ConfigError, KeyFileError) as error:
+        findings = [Finding("problem", str(error), "mend the file or the option")]
     for finding in findings:
         print(f"{finding.level:8}{finding.text}")
         if finding.remedy:
@@ -78,42 +84,54 @@ def main(argv: Sequence[str] | None = None) -> int:
 def examine(options: argparse.Namespace) -> list[Finding]:
     """Listen or ask, and reason about it; raises `ConfigError` for a wrong rig file or option."""
     actors = load_rig(options.rig).actors if options.rig is not None else (default_actor(),)
-    running = ask_status(options.host, options.control_port)
+    running = ask_status(options.host, options.control_port, options.key)
     if running is not None:
-        return _running(running, options)
+        return self_report.of_server(running, f"{options.host}:{options.control_port}")
     listener, counters = Listener(), Counters()
     log = logging.getLogger("manipnet.streams")
     findings: list[Finding] = []
     addresses: dict[str, str] = {}
-    motive: NatNetBodies | None = None
+    receivers, motive = _receivers(options, listener, counters)
     with ExitStack() as opened:
         log.addHandler(listener)
         opened.callback(log.removeHandler, listener)
-        receivers: dict[str, Any] = {
-            "bodies": ZmqBodies(listener, counters, options.host, options.input_port),
-            "osc": OscBodies(listener, counters, options.host, options.osc_port),
-        }
-        if options.natnet is not None:
-            host, port = parse_endpoint(options.natnet, COMMAND_PORT)
-            motive = NatNetBodies(
-                listener, counters, host, port, multicast=options.multicast, interface=options.interface
-            )
-            receivers["natnet"] = motive
         for what, receiver in receivers.items():
             try:
                 receiver.start()
             except ListenError as error:
-                remedy = "see who has the port: `ss -lntup`, on Windows `netstat -ano`"
-                findings.append(Finding("problem", str(error), remedy))
+                findings.append(_cannot_listen(error))
             else:
                 opened.callback(receiver.stop)
                 addresses[what] = receiver.address
                 findings.append(Finding("ok", f"listening for {options.seconds:g} s on {receiver.address}"))
-        threading.Event().wait(options.seconds)
+        others = set() if options.host in ("0.0.0.0", "::") else elsewhere.own_addresses() - {options.host}
+        beside = elsewhere.Elsewhere(sorted(others), options.osc_port, options.input_port)
+        listen(options.seconds)
+        findings += _elsewhere(options.host, beside.heard())
         if motive is not None:
-            findings += _motive(motive.status())
+            findings += self_report.of_motive(motive.status())
     heard = Heard(listener.sources, counters.snapshot().get("frames_dropped", {}), listener.complaints)
     return findings + diagnose(heard, expected_parts(actors), addresses)
+
+
+def _receivers(
+    options: argparse.Namespace, listener: Listener, counters: Counters
+) -> tuple[dict[str, Any], NatNetBodies | None]:
+    """Everything that would receive bodies in the server, and the one of NatNet if it is asked for."""
+    receivers: dict[str, Any] = {
+        "bodies": ZmqBodies(listener, counters, options.host, options.input_port),
+        "osc": OscBodies(listener, counters, options.host, options.osc_port),
+    }
+    if options.natnet is None:
+        return receivers, None
+    host, port = parse_endpoint(options.natnet, COMMAND_PORT)
+    motive = NatNetBodies(listener, counters, host, port, multicast=options.multicast, interface=options.interface)
+    return {**receivers, "natnet": motive}, motive
+
+
+def listen(seconds: float) -> None:
+    """Let the receivers work."""
+    threading.Event().wait(seconds)
 
 
 def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
@@ -126,10 +144,12 @@ def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
     return parts
 
 
-def ask_status(host: str, port: int) -> dict[str, Any] | None:
-    """The `status` of the server that runs there; None when none answers."""
+def ask_status(host: str, port: int, key: Path | None = None) -> dict[str, Any] | None:
+    """The `status` of the server that runs there; None when none answers. Raises `KeyFileError`."""
     with zmq.Context() as context, context.socket(zmq.REQ) as request:
         request.setsockopt(zmq.LINGER, 0)
+        if key is not None:
+            secure_client(request, read_client_keys(key))
         request.connect(f"tcp://{host}:{port}")
         request.send(b'{"op": "status"}')
         if not request.poll(int(1e3 * ANSWER_S)):
@@ -141,60 +161,26 @@ def ask_status(host: str, port: int) -> dict[str, Any] | None:
     return answer if isinstance(answer, dict) and "counters" in answer else None
 
 
-def _running(status: Mapping[str, Any], options: argparse.Namespace) -> list[Finding]:
-    """What a running server says of itself."""
-    where = f"{options.host}:{options.control_port}"
-    findings = [Finding("ok", f"a server runs here (control {where}); this is what it says")]
-    counters = status["counters"]
-    received = counters.get("frames_in", {})
-    dropped = counters.get("frames_dropped", {})
-    if not received:
-        findings += diagnose(Heard({}, dropped, ()), {}, {"server": f"the server at {options.host}"})
+def _cannot_listen(error: ListenError) -> Finding:
+    text = str(error)
+    if os.strerror(errno.EADDRINUSE) in text:
+        remedy = "see who has the port: `ss -lntup`, on Windows `netstat -ano`"
+    elif os.strerror(errno.EADDRNOTAVAIL) in text:
+        remedy = f"name an address of this machine: {', '.join(sorted(elsewhere.own_addresses()))}"
     else:
-        arrived = ", ".join(f"{count} by {source}" for source, count in received.items())
-        findings.append(Finding("ok", f"frames that arrived: {arrived}"))
-    if dropped.get("unknown_body"):
-        findings.append(
-            Finding(
-                "problem",
-                f"{dropped['unknown_body']} frames hold no body the rig knows",
-                "stop the server and run `manipnet doctor --rig FILE` to see which bodies arrive",
-            )
-        )
-    for actor, said in status.get("actors", {}).items():
-        for body, health in said.get("bodies", {}).items():
-            if health.get("state") != "live":
-                remedy = "occluded, switched off, or its sender stopped: see the tracking software"
-                findings.append(Finding("problem", f"{actor}: {body} is not tracked at present", remedy))
-    return findings
+        remedy = "mend the address or the port"
+    return Finding("problem", text, remedy)
 
 
-def _motive(status: Mapping[str, Any]) -> list[Finding]:
-    """What the NatNet client found out."""
-    findings = []
-    if status["server"] is not None:
-        bodies = ", ".join(f"{id} {name!r}" for id, name in status["bodies"].items()) or "none"
-        findings.append(Finding("ok", f"{status['server']} answers; rigid bodies it defines: {bodies}"))
-    if status["problem"] is not None:
-        findings.append(Finding("problem", f"NatNet: {status['problem']}", "see docs/natnet.md"))
-    elif status["state"] == "connecting":
-        findings.append(
-            Finding(
-                "problem",
-                "Motive does not answer",
-                "enable NatNet in Motive's streaming settings, set Local Interface to the card that faces this "
-                "machine, allow UDP 1510 and 1511 through the firewalls",
-            )
+def _elsewhere(host: str, heard: Mapping[str, int]) -> list[Finding]:
+    return [
+        Finding(
+            "problem",
+            f"{count} packets or connections came to {where}, but the server is to listen on {host}",
+            f"send to {host}, or start the server with --host {where.rpartition(':')[0]} (and --keys and --allow)",
         )
-    elif status["state"] != "streaming":
-        findings.append(
-            Finding(
-                "problem",
-                "Motive answers but streams no frames",
-                "choose Unicast as Transmission Type (or start with --multicast), and Live mode",
-            )
-        )
-    return findings
+        for where, count in heard.items()
+    ]
 
 
 if __name__ == "__main__":
