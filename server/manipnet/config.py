@@ -90,6 +90,8 @@ class ServerConfig:
     """Networks that may send OSC; none given means any that reaches the port."""
     insecure: bool = False
     demo: bool = False
+    takes: Path = Path("takes")
+    """Folder of the recordings."""
     dump_dir: Path | None = None
     rig: Path | None = None
     """The file this came from, where calibrations are stored."""

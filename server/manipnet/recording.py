@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
-from manipnet.streams.bodies import BodyFrame, MessageError, bodies_map, parse_bodies
+from manipnet.streams.bodies import BodyFrame, BodySample, MessageError, bodies_map, parse_bodies
 from manipnet.streams.wire import HandsMessage, decode_msgpack, encode_msgpack
 
 BODIES: Final = "/bodies"
@@ -166,6 +166,15 @@ def mesh_file(vertices: Array, faces: NDArray[np.integer[Any]], scale: float = 1
     content = trimesh.Trimesh(scale * vertices, faces, process=False).export(file_type="ply")
     assert isinstance(content, bytes)
     return content
+
+
+def bodies_of(message: HandsMessage) -> BodyFrame:
+    """The bodies of a hands message as the frame a tracker would have sent at that instant."""
+    bodies = [
+        BodySample(None, body.name, tuple(body.pose[:3].tolist()), tuple(body.pose[3:].tolist()), body.tracked)
+        for body in message.bodies
+    ]
+    return BodyFrame(message.t_capture, message.seq, tuple(bodies), message.t_publish, "hands")
 
 
 def read_about(path: Path | str) -> About:

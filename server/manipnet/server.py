@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from platformdirs import user_log_path
 
+from manipnet import __version__
 from manipnet.actor import Actor
 from manipnet.config import ActorConfig, ConfigError, ServerConfig, check
 from manipnet.control import Control, Handler
@@ -19,8 +20,9 @@ from manipnet.metrics import MetricsPage
 from manipnet.network.bundle import load_bundle
 from manipnet.page.host import LivePage
 from manipnet.placing import Placing
-from manipnet.props import Wardrobe
+from manipnet.props import Prop, Wardrobe
 from manipnet.publisher import Publisher
+from manipnet.recorder import Recorder, carried
 from manipnet.requests import Cast, Requests
 from manipnet.status import SilenceWatch, second_line
 from manipnet.streams.intake import ListenError
@@ -92,9 +94,13 @@ class Server:
     def _open(self, opened: ExitStack) -> tuple[TickLoop, dict[str, str]]:
         """Every socket, and the loop between them; `opened` closes them in reverse order."""
         config, counters = self._config, self.counters
-        publisher = Publisher(config, counters, self._keys)
+        cast = Cast(self._actors, self._mailbox)
+        recorder = Recorder(config.takes, lambda: self._about(cast), counters)
+        opened.callback(recorder.stop)
+        publisher = Publisher(config, counters, self._keys, recorder.note)
         opened.callback(publisher.close)
-        control = Control(config.host, config.control_port, self._handlers(), counters, self._keys)
+        handlers = {**self._handlers(cast), **recorder.handlers()}
+        control = Control(config.host, config.control_port, handlers, counters, self._keys)
         opened.callback(control.stop)
         control.start()
         page_host = LOOPBACK if self._keys is not None else config.host  # browsers have no keys
@@ -132,8 +138,7 @@ class Server:
             page,
         )
 
-    def _handlers(self) -> dict[str, Handler]:
-        cast = Cast(self._actors, self._mailbox)
+    def _handlers(self, cast: Cast) -> dict[str, Handler]:
         requests = Requests(
             self.session,
             self._bundle.name,
@@ -144,6 +149,14 @@ class Server:
             self.timings,
         )
         return {**requests.handlers(), **Placing(cast, self._config.rig).handlers()}
+
+    def _about(self, cast: Cast) -> tuple[dict[str, str], list[Prop]]:
+        """What a recording depends on."""
+        props = cast.ask(lambda: [prop for actor in self._actors for prop in actor.props])
+        bundle, rig = self._bundle, self._config.rig
+        about = {"session": self.session, "version": __version__, "model": bundle.name, "model_hash": bundle.model_hash}
+        about |= {"objects": carried(props)} | ({"rig": rig.read_text(encoding="utf-8")} if rig else {})
+        return about, props
 
     def _zmq_bodies(self) -> ZmqBodies:
         config = self._config

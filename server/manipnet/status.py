@@ -81,6 +81,7 @@ def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
     return {
         "seq": actor.seq,
         "look_ahead_s": timeline.look_ahead_s,
+        "paused": actor.paused,
         "hands": hands,
         "bodies": bodies,
         "ticks_skipped": timeline.skipped_late + timeline.skipped_at_restart,

@@ -16,9 +16,9 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from manipnet.config import parse_endpoint
 from manipnet.objects.mesh import load_mesh
-from manipnet.recording import BODIES, HANDS, RecordingError, RecordingWriter, mesh_file
+from manipnet.recording import BODIES, HANDS, RecordingError, RecordingWriter, bodies_of, mesh_file
 from manipnet.rig import load_rig
-from manipnet.streams.bodies import BodyFrame, BodySample, MessageError
+from manipnet.streams.bodies import MessageError
 from manipnet.streams.curve import secure_client
 from manipnet.streams.keys import read_client_keys
 from manipnet.streams.wire import TOPIC_MSGPACK, HandsMessage, decode_msgpack
@@ -117,15 +117,6 @@ def record_bodies(
             time.sleep(1e-3 * POLL_MS)
     finally:
         receiver.stop()
-
-
-def bodies_of(message: HandsMessage) -> BodyFrame:
-    """The bodies of a hands message as the frame a tracker would have sent at that instant."""
-    bodies = [
-        BodySample(None, body.name, tuple(body.pose[:3].tolist()), tuple(body.pose[3:].tolist()), body.tracked)
-        for body in message.bodies
-    ]
-    return BodyFrame(message.t_capture, message.seq, tuple(bodies), message.t_publish, "hands")
 
 
 def ask_server(control: str, keys: Path | None) -> tuple[dict[str, str], dict[str, bytes]]:

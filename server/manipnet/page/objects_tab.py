@@ -24,8 +24,8 @@ class ObjectsTab:
     def __init__(self, page: "Page", gui: viser.GuiApi, doing: Doing) -> None:
         self._page, self._doing = page, doing
         self._carried: dict[str, dict[str, Any]] = {}
-        self._body = gui.add_dropdown("Body", NONES)
-        self._object = gui.add_dropdown("Carries", NONES)
+        self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NONES)
+        self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Carries", NONES)
         self._scale = gui.add_slider("Size", 0.2, 3.0, 0.05, initial_value=1.0)
         self._position = gui.add_vector3("Moved, mm", (0.0, 0.0, 0.0), step=1.0)
         self._turn = gui.add_vector3("Turned, °", (0.0, 0.0, 0.0), step=1.0)

@@ -12,6 +12,8 @@ from manipnet.streams.wire import HandsMessage
 SPAN_S: Final = 30.0
 STEP_S: Final = 0.2
 _COLUMNS: Final = ("t", "rate", "total", "sense", "infer", "ik")
+_EMPTY: Final = np.array([-SPAN_S, 0.0])
+"""The charts' span before there is anything in it; a span of nothing would keep the browser busy for ever."""
 _INK: Final = "rgba(150,160,175,0.9)"
 _GRID: Final = {"stroke": "rgba(150,160,175,0.18)", "width": 1}
 
@@ -45,7 +47,9 @@ class History:
 
     def columns(self) -> dict[str, Array]:
         """`{name: (n,)}`; `t` counts back from now, seconds, all others are the worst of their step."""
-        rows = np.array(self._rows) if len(self._rows) > 1 else np.zeros((2, len(_COLUMNS)))
+        if len(self._rows) < 2:
+            return dict(zip(_COLUMNS, (_EMPTY, *[np.zeros(2)] * (len(_COLUMNS) - 1)), strict=True))
+        rows = np.array(self._rows)
         rows[:, 0] -= rows[-1, 0]
         return dict(zip(_COLUMNS, rows.T.copy(), strict=True))
 
@@ -70,13 +74,12 @@ class Plots:
 def _chart(
     gui: viser.GuiApi, title: str, series: tuple[tuple[str, str], ...], span: tuple[float, float] | None = None
 ) -> viser.GuiUplotHandle:
-    nothing = np.zeros(2)
     axis = {"stroke": _INK, "grid": _GRID, "ticks": _GRID, "font": "11px sans-serif"}
     return gui.add_uplot(
-        data=(nothing,) * (1 + len(series)),
+        data=(_EMPTY, *(np.zeros(2),) * len(series)),
         series=({"label": "s"}, *({"label": name, "stroke": color, "width": 2} for name, color in series)),  # pyright: ignore
         title=title,
-        scales={"x": {"time": False, "auto": True}, "y": {"range": span} if span else {"auto": True}},  # pyright: ignore
+        scales={"x": {"time": False, "range": (-SPAN_S, 0.0)}, "y": {"range": span} if span else {"auto": True}},  # pyright: ignore
         axes=({**axis, "size": 26}, {**axis, "size": 38}),  # pyright: ignore
         legend={"show": len(series) > 1},
         height=120 if len(series) == 1 else 150,
