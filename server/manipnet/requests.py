@@ -4,7 +4,8 @@ mailbox, between two ticks."""
 import base64
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any, Final, TypeVar
 
 from manipnet import __version__
 from manipnet.actor import Actor
@@ -14,13 +15,14 @@ from manipnet.geometry import Array
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
 from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.mailbox import BusyError, Mailbox
-from manipnet.objects.mesh import MeshError
+from manipnet.objects.mesh import UNITS_M, MeshError
 from manipnet.props import Prop, Wardrobe
 from manipnet.status import status
 from manipnet.streams.wire import VERSION
 from manipnet.telemetry import Counters, Timings
 from manipnet.timeline import MAX_LOOK_AHEAD_S, TICK_HZ
 
+MAX_PATH: Final = 1024
 T = TypeVar("T")
 
 
@@ -78,6 +80,7 @@ class Requests:
             "objects": self._objects,
             "mesh": self._mesh,
             "select_object": self._select_object,
+            "add_object": self._add_object,
             "look_ahead": self._look_ahead,
             "rest": self._rest,
             "pause": self._pause,
@@ -136,6 +139,16 @@ class Requests:
             raise RequestError(str(error)) from None
         prop, seq = self._cast.ask(lambda: (actor.carry(body, name, shape, scale), actor.seq))
         return {"actor": actor.config.name, "body": prop.name, **_prop(prop), "seq": seq}
+
+    def _add_object(self, request: Request) -> dict[str, Any]:
+        file = request.get("file")
+        if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH:
+            raise RequestError("file is missing or no text; give the path of a mesh on the server's machine")
+        try:
+            shape = self._wardrobe.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))
+        except MeshError as error:
+            raise RequestError(str(error)) from None
+        return {"object": shape.name}
 
     def _look_ahead(self, request: Request) -> dict[str, Any]:
         seconds = number(request, "seconds", 0.0, MAX_LOOK_AHEAD_S)

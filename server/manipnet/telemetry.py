@@ -42,7 +42,7 @@ BODY_REASONS = (
 )
 
 CONTROL_OPS = (
-    *("hello", "ping", "status", "objects", "mesh", "select_object", "place_object", "calibrate"),
+    *("hello", "ping", "status", "objects", "mesh", "select_object", "add_object", "place_object", "calibrate"),
     *("look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "invalid"),
 )
 
