@@ -19,7 +19,7 @@ LAYERS = (
     ("props", "actor", "page"),
     ("mailbox", "messages", "flight_recorder", "publisher", "control", "status", "metrics", "terminal", "diagnosis"),
     ("elsewhere", "self_report"),
-    ("requests", "placing", "recorder", "tick_loop", "doctor"),
+    ("requests", "surroundings", "placing", "recorder", "tick_loop", "doctor"),
     ("warm_up", "demo"),
     ("server",),
     ("cli",),

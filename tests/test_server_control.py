@@ -2,6 +2,7 @@
 
 import base64
 import json
+import time
 
 import msgpack
 import numpy as np
@@ -12,6 +13,7 @@ from live_server import Stage, scene
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
 from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.objects.library import library_names, load_library_mesh
+from manipnet.streams.clock import measure_offset
 from manipnet.telemetry import CONTROL_OPS
 
 OPS = ", ".join(op for op in CONTROL_OPS if op != "invalid")
@@ -33,6 +35,38 @@ def test_ping_tells_the_clock_that_stamps_the_messages(stage: Stage) -> None:
     before = stage.server.ask({"op": "ping"})["t"]
     published = stage.perform(0.1, scene)[-1].t_publish
     assert before < published < stage.server.ask({"op": "ping"})["t"]
+
+
+def test_the_clock_is_measured_by_ping_and_published_with_its_uncertainty(stage: Stage) -> None:
+    ahead_s = 1_000.0
+    with zmq.Context() as context, context.socket(zmq.REQ) as req:
+        req.connect(stage.server.addresses["control"])
+
+        def ping(**report: float | str) -> float:
+            req.send(msgpack.packb({"op": "ping", **report}) or b"")
+            return msgpack.unpackb(req.recv())["t"]
+
+        server = measure_offset(ping, lambda: time.monotonic() + ahead_s)
+        assert abs(server.offset_s + ahead_s) <= server.uncertainty_s
+        ping(name="tracker-pc", offset=-server.offset_s, uncertainty=server.uncertainty_s)
+    clock = stage.server.ask({"op": "status"})["clocks"]["tracker-pc"]
+    assert clock["clock_offset_s"] == -server.offset_s
+    assert clock["clock_uncertainty_s"] == server.uncertainty_s
+    assert 0.0 <= clock["age_s"] < 20.0
+    refused = stage.server.ask({"op": "ping", "name": "tracker-pc", "offset": "much"})
+    assert refused == {"error": "offset is 'much'; it must be a number in -10000000000.0 … 10000000000.0"}
+
+
+def test_status_tells_who_sends_and_who_is_connected(stage: Stage) -> None:
+    stage.perform(1.2, scene)
+    status = stage.server.ask({"op": "status"}, as_json=True)
+    (sender,) = (sender for source, sender in status["senders"].items() if sender["age_s"] < 1.0)
+    assert sender["frames"] > 120
+    assert sender["rate_hz"] == pytest.approx(120.0, rel=0.5)
+    newest_s = stage.start_s + 1.2  # sent just before the answer's time
+    assert newest_s - status["t"] <= sender["clock_offset_s"] < newest_s
+    assert sender["clock_uncertainty_s"] is None
+    assert status["connections"] == {"hands": 1, "web": 0, "bodies": 1, "control": 1}
 
 
 def test_status_tells_the_health_of_every_body_and_hand(stage: Stage) -> None:

@@ -3,6 +3,7 @@
 import socket
 import sys
 import time
+import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ def motive():
 @pytest.fixture(scope="module")
 def server(tiny_bundle, motive):
     options = ("--mesh", f"Box={LIBRARY_FOLDER / 'cube.ply'}", "--model", str(tiny_bundle), "--look-ahead", "0.1")
-    with serving(*options, "--natnet", f"127.0.0.1:{motive.port}") as server:
+    with serving(*options, "--natnet", f"127.0.0.1:{motive.port}", "--metrics-port=0") as server:
         motive.wait_for(12)
         yield server
 
@@ -71,7 +72,21 @@ def assert_live(messages, start_s):
 def test_natnet_to_hands(server, motive):
     messages = perform(server, lambda n, poses: natnet_frame(motive, n, poses), 5_000.0)
     assert_live(messages, 5_000.0)
-    assert server.ask({"op": "status"})["counters"]["frames_in"]["natnet"] == SECONDS * RATE_HZ
+    status = server.ask({"op": "status"})
+    assert status["counters"]["frames_in"]["natnet"] == SECONDS * RATE_HZ
+    assert status["natnet"]["state"] == "streaming"
+    assert status["natnet"]["problem"] is None
+    assert status["natnet"]["bodies"] == {"1": "left_wrist", "2": "right_wrist", "3": "Box"}
+    (sender,) = (said for source, said in status["senders"].items() if source.startswith("natnet:"))
+    assert sender["clock_offset_s"] == pytest.approx(status["natnet"]["capture_offset_s"])
+    assert sender["clock_uncertainty_s"] == status["natnet"]["clock_uncertainty_s"] > 0.0
+    with urllib.request.urlopen(server.addresses["metrics"], timeout=20.0) as response:
+        text = response.read().decode()
+    assert 'manipnet_natnet_state{state="streaming"} 1.0' in text
+    assert 'manipnet_natnet_state{state="connecting"} 0.0' in text
+    assert 'manipnet_clock_offset_seconds{clock="natnet"}' in text
+    assert 'manipnet_clock_uncertainty_seconds{clock="natnet"}' in text
+    assert 'manipnet_connections{socket="hands"}' in text
 
 
 def test_osc_to_hands(server):

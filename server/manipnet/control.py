@@ -130,11 +130,6 @@ def choice(request: Request, key: str, allowed: tuple, default: Any = None) -> A
     return value
 
 
-def ping(_: Request) -> dict[str, Any]:
-    """The server's monotonic clock, seconds."""
-    return {"t": time.monotonic()}
-
-
 def _decode(parts: list[bytes]) -> Request:
     if len(parts) != 1:
         raise RequestError(f"the request has {len(parts)} frames; send one, a msgpack or JSON map")

@@ -5,8 +5,8 @@ import logging
 import threading
 import time
 import traceback
-from collections.abc import Sequence
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final

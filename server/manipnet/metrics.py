@@ -1,23 +1,26 @@
 """Prometheus metrics over HTTP, from a thread of its own."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from prometheus_client import CollectorRegistry, start_http_server
-from prometheus_client.core import CounterMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from manipnet.streams.intake import ListenError
 from manipnet.telemetry import LABELS, STAGES, Counters, Timings
 
 QUANTILES = (50.0, 99.0, 99.9, 100.0)
+Gauge = tuple[str, str, Mapping[str, float]]
+"""A name without prefix, its label, and the value by the label's values, of which there are few."""
+Gauges = Callable[[], Iterable[Gauge]]
 
 
 class MetricsPage:
     """Serves `http://host:port/metrics`; raises `ListenError` when it cannot."""
 
-    def __init__(self, host: str, port: int, counters: Counters, timings: Timings) -> None:
+    def __init__(self, host: str, port: int, counters: Counters, timings: Timings, gauges: Gauges = tuple) -> None:
         registry = CollectorRegistry()
-        registry.register(_Figures(counters, timings))
+        registry.register(_Figures(counters, timings, gauges))
         try:
             self._server, self._thread = start_http_server(port, host, registry)
         except OSError as error:
@@ -34,8 +37,8 @@ class MetricsPage:
 
 
 class _Figures(Collector):
-    def __init__(self, counters: Counters, timings: Timings) -> None:
-        self._counters, self._timings = counters, timings
+    def __init__(self, counters: Counters, timings: Timings, gauges: Gauges) -> None:
+        self._counters, self._timings, self._gauges = counters, timings, gauges
 
     def collect(self) -> Iterator[Metric]:
         counted = self._counters.snapshot()
@@ -45,6 +48,11 @@ class _Figures(Collector):
                 family.add_metric([value], counted.get(name, {}).get(value, 0))
             yield family
         yield self._stages()
+        for name, label, values in self._gauges():
+            gauge = GaugeMetricFamily(f"manipnet_{name}", name.replace("_", " "), labels=[label])
+            for value, level in values.items():
+                gauge.add_metric([value], level)
+            yield gauge
 
     def _stages(self) -> Metric:
         name = "manipnet_stage_seconds"

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeVar
 from manipnet import __version__
 from manipnet.actor import Actor
 from manipnet.config import SCALE_RANGE
-from manipnet.control import Handler, Request, RequestError, choice, number, ping
+from manipnet.control import Handler, Request, RequestError, choice, number
 from manipnet.geometry import Array
 from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
 from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
@@ -75,7 +75,6 @@ class Requests:
         """One function per operation."""
         return {
             "hello": self._hello,
-            "ping": ping,
             "status": self._status,
             "objects": self._objects,
             "mesh": self._mesh,

@@ -71,7 +71,7 @@ def _body(which: str, health: Mapping[str, Any]) -> list[Finding]:
         return [
             Finding(
                 "problem",
-                f"{which} has never been tracked since the server started",
+                f"{which} has never been tracked since its stream began",
                 "its name or id in the rig is another than in the stream, or it is switched off or occluded: "
                 "`manipnet doctor --rig FILE` without the server tells which",
             )

@@ -30,6 +30,7 @@ from manipnet.streams.keys import read_server_keys
 from manipnet.streams.natnet_client import NatNetBodies
 from manipnet.streams.osc import OscBodies
 from manipnet.streams.zmq_bodies import ZmqBodies
+from manipnet.surroundings import Surroundings
 from manipnet.synthesis import Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
 from manipnet.tick_loop import TickLoop
@@ -68,6 +69,7 @@ class Server:
         self.session = secrets.token_hex(8)
         self.counters, self.timings = Counters(), Timings()
         self._mailbox, self._wardrobe, self._watch = Mailbox(self.counters), Wardrobe(), SilenceWatch()
+        self._around = Surroundings(self._mailbox.put)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model)
         self._actors = [self._actor(actor) for actor in config.actors]
@@ -100,6 +102,7 @@ class Server:
         publisher = Publisher(config, counters, self._keys, recorder.note)
         opened.callback(publisher.close)
         handlers = {**self._handlers(cast), **recorder.handlers()}
+        handlers |= self._around.handlers(handlers["status"])
         control = Control(config.host, config.control_port, handlers, counters, self._keys)
         opened.callback(control.stop)
         control.start()
@@ -107,18 +110,25 @@ class Server:
         page = LivePage(page_host, config.page_port, control.answer, counters)
         opened.callback(page.stop)
         page.start()
+        bodies = self._zmq_bodies()
+        self._around.connected = lambda: {
+            **publisher.connected(),
+            "bodies": bodies.connected(),
+            "control": control.connected(),
+        }
         addresses = {
             "hands": publisher.addresses["hands"],
-            "bodies": self._listen(opened, "--input-port", self._zmq_bodies()),
+            "bodies": self._listen(opened, "--input-port", bodies),
             "control": control.address,
             "osc": self._listen(opened, "--osc-port", self._osc_bodies()),
             "page": page.address,
             "web": publisher.addresses["web"],
         }
         if config.natnet is not None:
-            addresses["natnet"] = self._listen(opened, "--natnet", self._motive(*config.natnet))
+            self._around.motive = self._motive(*config.natnet)
+            addresses["natnet"] = self._listen(opened, "--natnet", self._around.motive)
         if config.metrics_port is not None:
-            metrics = MetricsPage(LOOPBACK, config.metrics_port, counters, self.timings)
+            metrics = MetricsPage(LOOPBACK, config.metrics_port, counters, self.timings, self._around.gauges)
             opened.callback(metrics.close)
             addresses["metrics"] = metrics.address
         return self._loop(publisher, page), addresses
@@ -160,21 +170,22 @@ class Server:
 
     def _zmq_bodies(self) -> ZmqBodies:
         config = self._config
-        return ZmqBodies(self._mailbox.put, self.counters, config.host, config.input_port, self._keys)
+        return ZmqBodies(self._around.sink, self.counters, config.host, config.input_port, self._keys)
 
     def _osc_bodies(self) -> OscBodies:
         config = self._config
-        return OscBodies(self._mailbox.put, self.counters, config.host, config.osc_port, config.allow or None)
+        return OscBodies(self._around.sink, self.counters, config.host, config.osc_port, config.allow or None)
 
     def _motive(self, host: str, port: int) -> NatNetBodies:
         return NatNetBodies(
-            self._mailbox.put,
+            self._around.sink,
             self.counters,
             host,
             port,
             multicast=self._config.multicast,
             interface=self._config.interface,
             up=self._config.up,
+            allow=self._config.allow,
         )
 
     def _make_demo(self) -> "Demo":

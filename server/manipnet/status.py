@@ -8,6 +8,7 @@ from typing import Any, Final
 from manipnet.actor import Actor
 from manipnet.presence import state_at_age
 from manipnet.telemetry import Counters, Timings
+from manipnet.timeline import BodyHealth
 
 WARN_AFTER_S: Final = 3.0
 ERROR_AFTER_S: Final = 10.0
@@ -76,7 +77,7 @@ def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
             "age_s": _finite(health.age_s),
             "rate_hz": _finite(health.rate_hz),
         }
-        for name, health in actor.health(now_s).items()
+        for name, health in (_unheard(actor) | actor.health(now_s)).items()
     }
     return {
         "seq": actor.seq,
@@ -87,6 +88,12 @@ def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
         "ticks_skipped": timeline.skipped_late + timeline.skipped_at_restart,
         "sender_restarts": timeline.restarts,
     }
+
+
+def _unheard(actor: Actor) -> dict[str, BodyHealth]:
+    """The parts of an actor, as if none had ever been tracked."""
+    names = [*actor.config.wrists, *(prop.name for prop in actor.props)]
+    return dict.fromkeys(names, BodyHealth(math.nan, math.inf))
 
 
 def _hand(actor: Actor, side: Any) -> str:

@@ -4,7 +4,7 @@ import logging
 import socket
 import time
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 from manipnet.streams.bodies import BodyFrame, BodySample, MessageError, make_sample
 from manipnet.streams.clock import ClockProbes
@@ -33,6 +33,7 @@ SILENT_S = 3.0
 """Without a packet for this long the server is believed gone, and is asked to connect again."""
 CHORES_S = 0.1
 
+STATES = ("connecting", "connected", "streaming", "silent")
 UpAxis = Literal["y", "z"]
 _STREAMS_MULTICAST = (
     "the server streams multicast: start with --multicast, or choose Unicast as Transmission Type in Motive's "
@@ -103,7 +104,7 @@ class NatNetBodies:
             self._data.stop()
             self._data = None
 
-    def status(self) -> dict[str, object]:
+    def status(self) -> dict[str, Any]:
         """What a person needs to know: state, server, names of the bodies, what is wrong; and two offsets from our
         clock: `clock_offset_s` of the server's, `capture_offset_s` of the frames' times (at the exposure).
         """
