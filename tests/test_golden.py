@@ -13,11 +13,14 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from manipnet.actor import ShownHand
 from manipnet.geometry import Array, quat_exp, quat_multiply
+from manipnet.messages import hand_poses
 from manipnet.network.bundle import Bundle, load_bundle
 from manipnet.network.features import features
-from manipnet.network.layout import INPUT, WINDOW_OFFSETS_S
+from manipnet.network.layout import INPUT, PRESENT, WINDOW_OFFSETS_S
 from manipnet.objects.shape import Shape, build_shape
+from manipnet.presence import Shown
 from manipnet.synthesis import HandScene, HandState, Synthesizer, windows_of
 from manipnet_tools.bench.shapes import gourd
 from tiny_bundle import write_tiny_bundle
@@ -29,7 +32,7 @@ TICK_S = 0.1
 FEATURES_WITHIN = 2e-5
 """Metres, or the unit of the column: rays are traced in single precision."""
 POSES_WITHIN = 2e-5
-"""Radians and metres."""
+"""Radians, metres, parts of a quaternion."""
 STRAY_RAYS = 3
 """Rays that graze an edge may go either way on another machine."""
 
@@ -82,8 +85,17 @@ def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
                 "raw_positions": [step.raw_positions for step in steps],
                 "distances": [step.distances for step in steps],
             }
+            | _in_world(scenes, states)
         )
     return {name: np.array([tick[name] for tick in ticks], dtype=np.float32) for name in ticks[0]}
+
+
+def _in_world(scenes: list[HandScene], states: list[HandState]) -> dict[str, list[np.ndarray]]:
+    """What clients get of each hand, its size a little off."""
+    shown = [Shown("live", state.angles, scene.wrist[PRESENT]) for scene, state in zip(scenes, states, strict=True)]
+    pairs = [(scene.side, ShownHand(hand, None)) for scene, hand in zip(scenes, shown, strict=True)]
+    poses = list(hand_poses(dict(pairs[:2]), 1.1).values()) + list(hand_poses(dict(pairs[2:]), 1.1).values())
+    return {"joints": [pose.joints for pose in poses], "local_rotations": [pose.rotations for pose in poses]}
 
 
 def _features(scene: HandScene, state: HandState) -> np.ndarray:
@@ -116,7 +128,7 @@ def test_the_scene_has_everything_in_it(stored: dict[str, np.ndarray]) -> None:
     assert np.abs(stored["positions"] - stored["raw_positions"]).max() > 1e-3, "the solver has work to do"
 
 
-@pytest.mark.parametrize("name", ["angles", "positions", "raw_positions", "distances"])
+@pytest.mark.parametrize("name", ["angles", "positions", "raw_positions", "distances", "joints", "local_rotations"])
 def test_hands_are_what_they_were(name: str, computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
     np.testing.assert_allclose(computed[name], stored[name], rtol=0.0, atol=POSES_WITHIN)
 

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from compiled import call
 from manipnet.geometry import compose, quat_exp
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, DOF_LIMITS_RAD
@@ -32,12 +33,13 @@ def ball(tmp_path_factory):
 
 def solve(name, ball, angles, targets, center=FAR):
     """Solve with the ball at `center` of the wrist frame."""
-    angles = angles.copy()
+    solved, limits = np.empty(20), DOF_LIMITS_RAD
     if name == "ccd":
-        solve_ccd(angles, targets, DOF_LIMITS_RAD)
+        call(solve_ccd, angles, targets, limits, solved)
     else:
-        solve_least_squares(angles, targets, NOT_TOUCHING, 0.0, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0)
-    return angles
+        field, turn = ball.field, np.eye(3)
+        call(solve_least_squares, angles, targets, NOT_TOUCHING, 0.0, limits, field, turn, -center, 1.0, solved)
+    return solved
 
 
 @pytest.mark.parametrize(("name", "within_m"), [("ccd", 2e-3), ("least_squares", 1.5e-3)])
@@ -91,16 +93,17 @@ def test_targets_follow_appendix_b(ball):
     distances = np.full(22, 0.008)
     distances[-1] = 0.03
     targets = np.empty((22, 3))
-    place_targets(ball.bvh, ball.field, np.eye(3), -center, 1.0, np.inf, positions, distances, targets)
+    exact = ball.solid._replace(exact_within_m=np.inf)
+    call(place_targets, exact, np.eye(3), -center, 1.0, positions, distances, targets)
     measured = ball.signed_distance(positions - center)[0]
-    wanted = [mix_distances(0.008, d) for d in measured[:-1]]
+    wanted = [call(mix_distances, 0.008, d) for d in measured[:-1]]
     np.testing.assert_allclose(ball.signed_distance(targets[:-1] - center)[0], wanted, atol=1e-4)
     np.testing.assert_array_equal(targets[-1], positions[-1])
 
 
 def test_mixing_trusts_the_prediction_inside_and_the_position_outside():
-    assert mix_distances(0.01, -0.01) == pytest.approx(0.8 * 0.01 - 0.2 * 0.01)
-    assert mix_distances(0.01, 0.02) == pytest.approx(0.2 * 0.01 + 0.8 * 0.02)
+    assert call(mix_distances, 0.01, -0.01) == pytest.approx(0.8 * 0.01 - 0.2 * 0.01)
+    assert call(mix_distances, 0.01, 0.02) == pytest.approx(0.2 * 0.01 + 0.8 * 0.02)
 
 
 def carried(speed_m_s, turn_rad_s):
@@ -118,21 +121,21 @@ STILL = np.tile(np.array([0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), (21, 1))
 @pytest.mark.parametrize(("speed", "turn"), [(0.2, 0.0), (0.0, 1.0), (0.1, -0.7)])
 def test_an_object_that_moves_with_the_wrist_is_held(speed, turn):
     wrist = carried(speed, turn)
-    assert hold_share(wrist, compose(wrist, np.tile(BESIDE, (21, 1)))) == pytest.approx(1.0)
+    assert call(hold_share, wrist, compose(wrist, np.tile(BESIDE, (21, 1)))) == pytest.approx(1.0)
 
 
 def test_an_object_that_rests_or_moves_by_itself_is_not_held():
     wrist = carried(0.3, 0.5)
-    assert hold_share(wrist, STILL) == 0.0
-    assert hold_share(STILL, wrist) == 0.0
-    assert hold_share(STILL, compose(STILL, np.tile(BESIDE, (21, 1)))) == 0.0
+    assert call(hold_share, wrist, STILL) == 0.0
+    assert call(hold_share, STILL, wrist) == 0.0
+    assert call(hold_share, STILL, compose(STILL, np.tile(BESIDE, (21, 1)))) == 0.0
 
 
 def test_a_grip_is_the_thumb_and_the_nearest_fingers():
     distances, grip = np.full(22, 0.05), np.empty(5)
     distances[5:8] = distances[18] = 0.012  # the index finger
     distances[8:11] = distances[19] = 0.016
-    grip_into(distances, 0.8, grip)
+    call(grip_into, distances, 0.8, grip)
     assert grip[0] == grip[1] == pytest.approx(0.8)
     assert 0.0 < grip[2] < 0.8
     assert np.all(grip[3:] == 0.0)
@@ -148,8 +151,19 @@ def test_a_hand_that_holds_closes_on_the_object(ball):
         angles = start.copy()
         for _ in range(20):
             targets, _ = forward_kinematics(angles)
-            solve_least_squares(
-                angles, targets, NOT_TOUCHING, hold, DOF_LIMITS_RAD, ball.field, np.eye(3), -center, 1.0
+            field, turn, limits, start_angles = ball.field, np.eye(3), DOF_LIMITS_RAD, angles.copy()
+            call(
+                solve_least_squares,
+                start_angles,
+                targets,
+                NOT_TOUCHING,
+                hold,
+                limits,
+                field,
+                turn,
+                -center,
+                1.0,
+                angles,
             )
         gaps.append(fingertip_gaps(forward_kinematics(angles)[0], center).min())
     assert gaps[0] > 0.008

@@ -6,15 +6,12 @@ import pytest
 from manipnet.geometry import (
     Array,
     compose,
-    matrix_to_quat,
     mirror_points,
     mirror_poses,
-    mirror_quats,
     quat_normalize,
     quat_rotate,
 )
-from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES, OPENXR_PARENTS, WEBXR_JOINT_NAMES, openxr_joints
-from manipnet.hand.kinematics import forward_kinematics
+from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES, OPENXR_PARENTS, WEBXR_JOINT_NAMES, pose_in_world
 from manipnet.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
 
 INDEX = {name: i for i, name in enumerate(OPENXR_JOINT_NAMES)}
@@ -38,11 +35,7 @@ def random_wrist(seed: int) -> Array:
 
 
 def joints_of(side: str, wrist: Array, angles: Array, scale: float = 1.0) -> Array:
-    positions, matrices = forward_kinematics(angles)
-    positions, quats = positions * scale, matrix_to_quat(matrices)
-    if side == "left":
-        positions, quats = mirror_points(positions), mirror_quats(quats)
-    return openxr_joints([side], wrist[None], positions[None], quats[None])[0]
+    return pose_in_world([side], angles[None], wrist[None], scale)[1][0]
 
 
 def axes(joints: Array, *names: str) -> tuple[Array, Array]:

@@ -231,22 +231,20 @@ class Actor:
         self, side: Side, wrist: BodyAtTick, other: BodyAtTick | None, thing: BodyAtTick, prop: Prop
     ) -> HandScene:
         """The scene as the model's hand would see it: for a larger hand everything is smaller."""
-        shrink = np.append(np.full(3, 1.0 / self.config.hand_scale), np.ones(4))
-        other_window = None if other is None or other.age_s > HOLD_AFTER_S else other.window * shrink
-        return HandScene(
-            side,
-            wrist.window * shrink,
-            other_window,
-            thing.window * shrink,
-            prop.shape,
-            prop.scale / self.config.hand_scale,
-        )
+        size = self.config.hand_scale
+        other_window = None if other is None or other.age_s > HOLD_AFTER_S else _shrunk(other.window, size)
+        wrist_window, thing_window = _shrunk(wrist.window, size), _shrunk(thing.window, size)
+        return HandScene(side, wrist_window, other_window, thing_window, prop.shape, prop.scale / size)
 
     def _elapsed_s(self, tick: Tick) -> float:
         """Stream time since the last tick shown; across a restart of the sender, one tick."""
         if self._last is None or self._last[0] != tick.run:
             return TICK_S
         return (tick.index - self._last[1]) * TICK_S
+
+
+def _shrunk(window: Array, size: float) -> Array:
+    return window if size == 1.0 else window * np.append(np.full(3, 1.0 / size), np.ones(4))
 
 
 def _parts(config: ActorConfig) -> dict[BodyKey, str]:

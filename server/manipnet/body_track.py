@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import njit
+from manipnet.kernels import inner, kernel
 
 KEEP: Final = 1024
 """Newest samples kept: more than 2 s at the highest rate accepted."""
@@ -73,10 +73,6 @@ class BodyTrack:
         before = int(np.searchsorted(self.times, t_s + TIME_TOLERANCE_S))
         return max(t_s - float(self._times[before - 1]), 0.0) if before else np.inf
 
-    def known(self, until_s: float) -> int:
-        """How many samples serve an instant `until_s`: up to the first one at or after it, which brackets it."""
-        return min(int(np.searchsorted(self.times, until_s - TIME_TOLERANCE_S)) + 1, self._count)
-
     def _align(self, at: int) -> None:
         """Keep every neighbouring pair of quaternions in one hemisphere (trackers flip signs freely)."""
         if at and self._poses[at, 3:] @ self._poses[at - 1, 3:] < 0.0:
@@ -92,43 +88,65 @@ class BodyTrack:
         self._count = KEEP
 
 
-def sample(tracks: Sequence[BodyTrack], times_s: Array, until_s: float, forecast: Forecast | None) -> Array:
-    """Poses of several non-empty tracks at `times_s (n,)`: `(len(tracks), n, 7)`.
+def sample(
+    tracks: Sequence[BodyTrack], times_s: Array, present_s: float, until_s: float, forecast: Forecast | None
+) -> tuple[Array, list[float]]:
+    """Poses of several non-empty tracks at rising `times_s (n,)`: `(len(tracks), n, 7)`, and their ages at `present_s`.
 
     Positions are interpolated linearly, rotations on the shortest arc, both by time. Only samples up to `until_s`
     and the one that brackets it are used. Before the first sample its pose stands; after the last one `forecast`
     continues the motion, or the last pose stands when there is none.
     """
-    poses = np.empty((len(tracks), len(times_s), 7))
+    poses, ages = np.empty((len(tracks), len(times_s), 7)), []
     for row, track in zip(poses, tracks, strict=True):
-        known = track.known(until_s)
-        times, samples = track.times[:known], track.poses[:known]
-        _interpolate(times, samples, times_s, np.searchsorted(times, times_s, side="right"), row)
-        if forecast is not None:
-            beyond = times_s > times[-1] + TIME_TOLERANCE_S
-            if beyond.any():
-                row[beyond] = forecast(times, samples, times_s[beyond])
-    return poses
+        known, age_s = _resample(track.times, track.poses, times_s, present_s, until_s, row)
+        ages.append(age_s)
+        if forecast is not None and times_s[-1] > (last_s := track.times[known - 1] + TIME_TOLERANCE_S):
+            beyond = int(np.searchsorted(times_s, last_s, side="right"))
+            row[beyond:] = forecast(track.times[:known], track.poses[:known], times_s[beyond:])
+    return poses, ages
 
 
-@njit(cache=True, nogil=True)
-def _interpolate(times, poses, at, followers, out):
-    """Poses at the instants `at` between rising `times`, clamped at both ends, into `out`; `followers` are the
-    first times after each instant."""
+@inner
+def _count_before(times, t_s):
+    """How many of the rising `times` are before an instant."""
+    low, high = 0, len(times)
+    while low < high:
+        middle = (low + high) >> 1
+        if times[middle] < t_s:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _resample(times, poses, at, present_s, until_s, out):
+    """Poses at the rising instants `at` between rising `times`, clamped at both ends, into `out`.
+
+    Returns how many samples serve instants up to `until_s` (up to the first at or after it, which brackets it), and
+    the age at `present_s` of the newest sample then; infinite when there is none.
+    """
+    known = min(_count_before(times, until_s - TIME_TOLERANCE_S) + 1, len(times))
+    before = _count_before(times, present_s + TIME_TOLERANCE_S)
+    age_s = max(present_s - times[before - 1], 0.0) if before > 0 else np.inf
+    after = _count_before(times[:known], at[0])
     for i in range(len(at)):
-        after = followers[i]
-        if after == 0 or after == len(times):
+        while after < known and times[after] <= at[i]:
+            after += 1
+        if after == 0 or after == known:
             for k in range(7):
-                out[i, k] = poses[min(after, len(times) - 1), k]
+                out[i, k] = poses[min(after, known - 1), k]
             continue
         before = after - 1
         fraction = (at[i] - times[before]) / (times[after] - times[before])
         for k in range(3):
             out[i, k] = poses[before, k] + fraction * (poses[after, k] - poses[before, k])
         _slerp_into(poses[before, 3:], poses[after, 3:], fraction, out[i, 3:])
+    return known, age_s
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _slerp_into(a, b, fraction, out):
     """Between unit quaternions of one hemisphere, on the arc between them."""
     cosine = min(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3], 1.0)

@@ -26,6 +26,7 @@ DEFAULTS = {
     "model": "manipnet-small",
     "look_ahead": 0.5,
 }
+PROVIDERS = ("auto", "cpu", "cuda")
 UNITS = ("m", "dm", "cm", "mm", "in")
 """Shown in the help; the values themselves live in `config.ServerConfig`, which a test compares with these."""
 
@@ -66,6 +67,7 @@ def build_parser() -> argparse.ArgumentParser:
     what.add_argument("--up", choices=("y", "z"), help="the axis that Motive streams as up (default: y)")
     how = parser.add_argument_group("how fingers are made")
     _option(how, "model", str, "NAME", "a shipped model, or the folder of one")
+    how.add_argument("--provider", choices=PROVIDERS, help="what the network runs on (default: auto, a GPU if it can)")
     _option(how, "look_ahead", float, "SECONDS", "future to wait for, 0 … 0.5; what is missing is forecast")
     where = parser.add_argument_group("where it listens (port 0 takes a free one)")
     _option(where, "host", str, "ADDRESS", "address of this machine to listen on")
@@ -94,6 +96,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Serve until SIGINT or SIGTERM; the exit status: 0 after a clean stop, 1 for what cannot be served."""
     arguments = build_parser().parse_args(argv)
     # The libraries behind these take a second to load: --help and a mistyped option should not.
+    from manipnet.first_start import Helper
+
+    helper = Helper()
+    helper.start()
     from manipnet.config import ConfigError
     from manipnet.network.bundle import BundleError
     from manipnet.objects.mesh import MeshError
@@ -111,7 +117,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(describe(config), end="")
             return 0
         server = Server(config, terminal.say)
-        server.run(stop.is_set)
+        server.run(stop.is_set, helper.wait)
     except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1

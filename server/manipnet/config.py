@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from manipnet.geometry import Array
-from manipnet.network.bundle import DEFAULT_MODEL
+from manipnet.network.bundle import DEFAULT_MODEL, Provider
 from manipnet.objects.library import library_file
 from manipnet.streams.guard import Network
 from manipnet.timeline import MAX_LOOK_AHEAD_S
@@ -79,6 +79,7 @@ class ServerConfig:
     vmc: tuple[str, int] | None = None
     livelink: tuple[str, int] | None = None
     model: str = DEFAULT_MODEL
+    provider: Provider = "auto"
     look_ahead_s: float = MAX_LOOK_AHEAD_S
     objects: Path | None = None
     """Folder of the user's own object meshes."""

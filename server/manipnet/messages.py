@@ -5,16 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from manipnet.actor import Actor, ShownHand
-from manipnet.geometry import matrix_to_quat, mirror_points, mirror_quats, quat_conjugate, quat_multiply
-from manipnet.hand.joint_sets import openxr_joints
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.hand.skeleton import BONE_COUNT, PARENTS
+from manipnet.hand.joint_sets import pose_in_world
 from manipnet.presence import HOLD_AFTER_S
 from manipnet.streams.wire import BodyPose, HandPose, HandsMessage, Latency
 from manipnet.synthesis import Side
 from manipnet.timeline import Tick
-
-_PARENTS = PARENTS[1:BONE_COUNT]
 
 
 def hands_message(
@@ -47,15 +42,9 @@ def hand_poses(hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, Hand
     """What is shown of each hand, with its joints in the world; `scale` is the hand's size over the model's."""
     if not hands:
         return {}
-    sides, shown = list(hands), [hand.shown for hand in hands.values()]
-    positions, rotations = forward_kinematics(np.stack([hand.angles for hand in shown]))
-    positions, quats = positions * scale, matrix_to_quat(rotations)
-    if "left" in hands:
-        left = sides.index("left")
-        positions[left], quats[left] = mirror_points(positions[left]), mirror_quats(quats[left])
-    local = quats.copy()
-    local[:, 1:] = quat_multiply(quat_conjugate(quats[:, _PARENTS]), quats[:, 1:])
-    joints = openxr_joints(sides, np.stack([hand.wrist for hand in shown]), positions, quats)
+    shown = [hand.shown for hand in hands.values()]
+    angles, wrists = np.stack([hand.angles for hand in shown]), np.stack([hand.wrist for hand in shown])
+    local, joints = pose_in_world(list(hands), angles, wrists, scale)
     return {
         side: HandPose(
             state=hand.shown.state,

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from manipnet.config import ObjectConfig
-from manipnet.geometry import Array, mirror_points, transform
+from manipnet.geometry import Array
 from manipnet.objects.library import library_names, load_library_mesh
 from manipnet.objects.shape import Shape, build_shape, load_shape
 from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S
 from manipnet.synthesis import Side
 from manipnet.timeline import BodyAtTick
 
-PALM_M: Final = np.array([0.09, 0.0, -0.03])
-"""A little in front of the palm of a right hand, in its wrist frame: where what it takes will be."""
+PALM_M: Final[Mapping[Side, tuple[float, float, float]]] = {"right": (0.09, 0.0, -0.03), "left": (-0.09, 0.0, -0.03)}
+"""A little in front of each palm, in its wrist frame: where what it takes will be."""
 HYSTERESIS_M: Final = 0.03
 """Another prop must be this much nearer before a hand turns to it."""
 
@@ -93,7 +91,7 @@ def choose_prop(
     tracked = [prop for prop in props if prop.name in bodies and bodies[prop.name].age_s <= HOLD_AFTER_S]
     if len(tracked) < 2:
         return tracked[0] if tracked else None
-    palm = transform(T_world_wrist, PALM_M if side == "right" else mirror_points(PALM_M)).tolist()
+    palm = _carried(T_world_wrist.tolist(), PALM_M[side])
     nearest, least_m = tracked[0], math.inf
     # no exact distance for a prop that is farther than the nearest one even if it reaches all the way to the palm
     for bound_m, _, prop in sorted((_least_distance(palm, prop, bodies), i, prop) for i, prop in enumerate(tracked)):
@@ -111,12 +109,24 @@ def _least_distance(p_palm: Sequence[float], prop: Prop, bodies: Mapping[str, Bo
 
 def palm_distance(p_palm: Sequence[float], prop: Prop, T_world_object: Array) -> float:
     """Signed distance of a world point to a prop's surface, metres."""
-    p_object = np.array([_carried_back(T_world_object.tolist(), p_palm)]) / prop.scale
-    return float(prop.shape.signed_distance(p_object)[0][0]) * prop.scale
+    x, y, z = _carried_back(T_world_object.tolist(), p_palm)
+    return prop.shape.distance((x / prop.scale, y / prop.scale, z / prop.scale)) * prop.scale
+
+
+def _carried(T_a_b: Sequence[float], p_b: Sequence[float]) -> tuple[float, float, float]:
+    """A point of frame b in frame a; NumPy would take ten times as long for one point."""
+    px, py, pz, x, y, z, w = T_a_b
+    dx, dy, dz = p_b
+    tx, ty, tz = 2.0 * (y * dz - z * dy), 2.0 * (z * dx - x * dz), 2.0 * (x * dy - y * dx)
+    return (
+        px + dx + w * tx + y * tz - z * ty,
+        py + dy + w * ty + z * tx - x * tz,
+        pz + dz + w * tz + x * ty - y * tx,
+    )
 
 
 def _carried_back(T_a_b: Sequence[float], p_a: Sequence[float]) -> tuple[float, float, float]:
-    """A point of frame a in frame b; NumPy would take ten times as long for one point."""
+    """The same point back: one of frame a in frame b."""
     px, py, pz, x, y, z, w = T_a_b
     dx, dy, dz = p_a[0] - px, p_a[1] - py, p_a[2] - pz
     tx, ty, tz = 2.0 * (dy * z - dz * y), 2.0 * (dz * x - dx * z), 2.0 * (dx * y - dy * x)

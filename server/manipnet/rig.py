@@ -12,6 +12,7 @@ import numpy as np
 from manipnet.config import SCALE_RANGE, WRISTS, ActorConfig, BodyConfig, ConfigError, ObjectConfig
 from manipnet.geometry import Array, quat_normalize
 from manipnet.hand.skeleton import DOF_NAMES
+from manipnet.network.bundle import PROVIDERS
 from manipnet.objects.library import library_file, library_names
 from manipnet.objects.mesh import UNITS_M
 from manipnet.rig_source import read_tree
@@ -35,6 +36,7 @@ SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
     "vmc": (str,),
     "livelink": (str,),
     "model": (str,),
+    "provider": (str,),
     "look_ahead": (int, float),
     "objects": (str,),
     "objects_unit": (str,),
@@ -221,6 +223,8 @@ def _wrong(key: str, value: Any) -> str:
         return f"0 … {MAX_LOOK_AHEAD_S} s"
     if key == "allow" and not all(isinstance(network, str) for network in value):
         return "networks as text, for example 192.168.1.0/24"
+    if key == "provider" and value not in PROVIDERS:
+        return ", ".join(PROVIDERS)
     if key == "objects_unit" and value not in UNITS_M:
         return ", ".join(UNITS_M)
     return "y, z" if key == "up" and value not in ("y", "z") else ""

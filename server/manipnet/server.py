@@ -71,17 +71,19 @@ class Server:
         self._mailbox, self._wardrobe, self._watch = Mailbox(self.counters), Wardrobe(), SilenceWatch()
         self._around = Surroundings(self._mailbox.put)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
-        self._bundle = load_bundle(config.model)
+        self._bundle = load_bundle(config.model, config.provider)
         self._actors = [self._actor(actor) for actor in config.actors]
         self._shown = 0
         self._demo = self._make_demo() if config.demo else None
 
-    def run(self, stopping: Callable[[], bool]) -> None:
+    def run(self, stopping: Callable[[], bool], sensing_compiled: Callable[[], object] = lambda: None) -> None:
         """Listen, say `ready`, turn bodies into hands until `stopping`, close everything.
 
-        Raises `ListenError` for an address that is taken, and `ConfigError` for a receiver nobody knows.
+        `sensing_compiled` as for `warm_up`. Raises `ListenError` for an address that is taken, and `ConfigError` for a
+        receiver nobody knows.
         """
-        warm_up(self._bundle, self._wardrobe.shapes() or [self._wardrobe.shape(WARM_UP_SHAPE)])
+        shapes = self._wardrobe.shapes() or [self._wardrobe.shape(WARM_UP_SHAPE)]
+        warm_up(self._bundle, shapes, sensing_compiled)
         with ExitStack() as opened:
             loop, addresses = self._open(opened)
             sys.setswitchinterval(SWITCH_INTERVAL_S)

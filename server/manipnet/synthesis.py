@@ -3,7 +3,7 @@
 The same code runs live, in replay, offline, in training and in evaluation.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,17 +19,19 @@ from manipnet.geometry import (
     quat_multiply,
     transform,
 )
-from manipnet.hand.kinematics import forward_kinematics, forward_kinematics_into
-from manipnet.ik.correct import CORRECTIONS, SOLVERS, SolverName
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.ik.pose import POSERS, SOLVERS, Poses, SolverName, room_for_poses
 from manipnet.network.bundle import Bundle
-from manipnet.network.decode import decode_into
-from manipnet.network.features import Windows, features
-from manipnet.network.layout import PRESENT
+from manipnet.network.features import RAYS_PER_HAND, Windows, sense
+from manipnet.network.layout import INPUT_SIZE, PRESENT, WINDOW_OFFSETS_S
 from manipnet.objects.shape import Shape
+from manipnet.sensing.proximity import room_for_rays
 
 Side = Literal["left", "right"]
 ABSENT_HAND_M = 0.45
 """Distance at which a hand that is not tracked is assumed to be."""
+_SIGNS: dict[Side, Array] = {"left": mirror_poses(np.ones(7)), "right": np.ones(7)}
+"""What makes a pose the one of a right hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,19 +94,32 @@ def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations:
 
 def windows_of(scenes: Sequence[HandScene]) -> Windows:
     """Scenes as the network sees them: left hands mirrored into right ones."""
-    mirrored = np.array([scene.side == "left" for scene in scenes])
-    wrist, obj = np.stack([s.wrist for s in scenes]), np.stack([s.object for s in scenes])
-    other = np.stack([_other_positions(scene) for scene in scenes])
-    wrist[mirrored], obj[mirrored] = mirror_poses(wrist[mirrored]), mirror_poses(obj[mirrored])
-    other[mirrored] = mirror_points(other[mirrored])
-    return Windows(wrist, other, obj, mirrored, np.array([float(scene.scale) for scene in scenes]))
+    windows = _room_for_windows(len(scenes))
+    for n, scene in enumerate(scenes):
+        _put_scene(windows, n, scene)
+    return windows
+
+
+def _room_for_windows(count: int) -> Windows:
+    shape = (count, len(WINDOW_OFFSETS_S))
+    return Windows(
+        np.empty((*shape, 7)), np.empty((*shape, 3)), np.empty((*shape, 7)), np.empty(count, np.bool_), np.empty(count)
+    )
+
+
+def _put_scene(windows: Windows, n: int, scene: HandScene) -> None:
+    signs = _SIGNS[scene.side]
+    np.multiply(scene.wrist, signs, windows.wrist[n])
+    np.multiply(scene.object, signs, windows.object[n])
+    np.multiply(_other_positions(scene), signs[:3], windows.other_wrist[n])
+    windows.mirrored[n], windows.scale[n] = scene.side == "left", scene.scale
 
 
 def _other_positions(scene: HandScene) -> Array:
     if scene.other_wrist is not None:
         return scene.other_wrist[:, :3]
-    aside = np.array([[0.0, 0.0, ABSENT_HAND_M, 0.0, 0.0, 0.0, 1.0]])
-    return np.repeat(compose(scene.wrist[PRESENT : PRESENT + 1], aside)[:, :3], len(scene.wrist), axis=0)
+    aside = np.array([0.0, 0.0, ABSENT_HAND_M, 0.0, 0.0, 0.0, 1.0])
+    return compose(scene.wrist[PRESENT], aside)[:3]
 
 
 class Synthesizer:
@@ -119,7 +134,8 @@ class Synthesizer:
         """`on_stage` hears the name of each stage as it ends: `sense`, `infer`, `ik`."""
         if solver not in SOLVERS:
             raise ValueError(f"solver {solver!r} is unknown; allowed are {', '.join(SOLVERS)}")
-        self._bundle, self._correct, self._on_stage = bundle, CORRECTIONS.get(solver), on_stage
+        self._bundle, self._pose, self._on_stage = bundle, POSERS[solver], on_stage
+        self._batches: dict[int, _Batch] = {}
 
     def rest_state(self) -> HandState:
         """The neutral pose every hand starts from."""
@@ -129,59 +145,58 @@ class Synthesizer:
         """The next pose of each hand, from its scene at this tick and its state after the last one."""
         if not scenes:
             return []
-        windows = windows_of(scenes)
-        groups = _by_shape(scenes)
-        positions = np.stack([state.positions for state in states])
-        rotations = np.stack([state.rotations for state in states])
-        rows = [
-            features(shape, _subset(windows, members), positions[members], rotations[members])
-            for shape, members in groups
-        ]
+        count, bundle = len(scenes), self._bundle
+        if count not in self._batches:
+            self._batches[count] = _Batch(count)
+        batch, poses = self._batches[count], room_for_poses(count)
+        order = sorted(range(count), key=lambda index: id(scenes[index].shape))
+        for n, index in enumerate(order):
+            batch.put(n, scenes[index], states[index])
+            poses.correction[n] = states[index].correction
+        groups = _groups([scenes[index].shape for index in order])
+        for shape, first, last in groups:
+            sense(shape, batch.windows, batch.positions, batch.rotations, first, last, batch.rays, batch.rows)
         self._on_stage("sense")
-        outputs = self._bundle.infer(rows[0] if len(rows) == 1 else np.concatenate(rows)).astype(np.float64)
+        outputs = bundle.infer(batch.rows)
         self._on_stage("infer")
-        steps: list[HandStep | None] = [None] * len(scenes)
-        order = np.concatenate([members for _, members in groups])
-        for output, index in zip(outputs, order, strict=True):
-            steps[index] = self._pose(output, scenes[index], states[index], windows, index)
+        for shape, first, last in groups:
+            self._pose(
+                shape.solid,
+                batch.windows,
+                outputs,
+                batch.angles,
+                bundle.response,
+                bundle.limits,
+                first,
+                last,
+                poses,
+            )
+        steps = dict(zip(order, _steps(poses), strict=True))
         self._on_stage("ik")
-        return [step for step in steps if step is not None]
-
-    def _pose(self, output: Array, scene: HandScene, state: HandState, windows: Windows, index: int) -> HandStep:
-        shape, bundle = scene.shape, self._bundle
-        angles, distances, correction = np.empty(20), np.empty(22), state.correction.copy()
-        raw_positions, positions = np.empty((22, 3)), np.empty((22, 3))
-        rotations, axes = np.empty((17, 3, 3)), np.empty((20, 3))
-        decode_into(output, state.angles, bundle.response, bundle.limits, rotations, angles, distances)
-        forward_kinematics_into(angles, raw_positions, rotations, axes)
-        if self._correct is None:
-            return HandStep(HandState(angles, raw_positions, rotations, correction), distances, raw_positions)
-        self._correct(
-            shape.bvh,
-            shape.field,
-            shape.exact_within_m,
-            windows.wrist[index],
-            windows.object[index],
-            windows.mirrored[index],
-            windows.scale[index],
-            raw_positions,
-            distances,
-            bundle.limits,
-            angles,
-            correction,
-        )
-        forward_kinematics_into(angles, positions, rotations, axes)
-        return HandStep(HandState(angles, positions, rotations, correction), distances, raw_positions)
+        return [steps[index] for index in range(count)]
 
 
-def _by_shape(scenes: Sequence[HandScene]) -> list[tuple[Shape, np.ndarray]]:
-    members: dict[int, list[int]] = {}
-    for index, scene in enumerate(scenes):
-        members.setdefault(id(scene.shape), []).append(index)
-    return [(scenes[indices[0]].shape, np.array(indices)) for indices in members.values()]
+class _Batch:
+    """What the kernels take of so many hands: made once, filled at every tick."""
+
+    def __init__(self, count: int) -> None:
+        self.windows = _room_for_windows(count)
+        self.angles, self.positions, self.rotations = room_for_poses(count)[:3]
+        self.rays = room_for_rays(count * RAYS_PER_HAND + 1)
+        self.rows = np.empty((count, INPUT_SIZE), np.float32)
+
+    def put(self, n: int, scene: HandScene, state: HandState) -> None:
+        """Let a hand be number `n`."""
+        _put_scene(self.windows, n, scene)
+        self.angles[n], self.positions[n], self.rotations[n] = state.angles, state.positions, state.rotations
 
 
-def _subset(windows: Windows, members: np.ndarray) -> Windows:
-    if len(members) == len(windows.wrist):
-        return windows
-    return Windows(*(values[members] for values in windows))
+def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
+    """Stretches of one shape: the shape, the first hand, one past the last."""
+    starts = [n for n, shape in enumerate(shapes) if n == 0 or shape is not shapes[n - 1]]
+    return [(shapes[first], first, last) for first, last in zip(starts, [*starts[1:], len(shapes)], strict=True)]
+
+
+def _steps(poses: Poses) -> Iterator[HandStep]:
+    for angles, positions, rotations, correction, distances, raw_positions in zip(*poses, strict=True):
+        yield HandStep(HandState(angles, positions, rotations, correction), distances, raw_positions)

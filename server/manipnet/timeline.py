@@ -302,10 +302,11 @@ class Timeline:
         if tracks:
             instants = time_s + WINDOW_OFFSETS_S
             # The future of a sender that has stopped is not forecast: its last pose stands.
-            poses = sample(list(tracks.values()), instants, due_s, None if silent else self._forecast)
+            forecast = None if silent else self._forecast
+            poses, ages = sample(list(tracks.values()), instants, time_s, due_s, forecast)
             bodies = {
-                key: BodyAtTick(rows, rows[PRESENT], track.age_s(time_s))
-                for (key, track), rows in zip(tracks.items(), poses, strict=True)
+                key: BodyAtTick(rows, rows[PRESENT], age_s)
+                for key, rows, age_s in zip(tracks, poses, ages, strict=True)
             }
         waited_for_s = min(run.completed_s(due_s), now_s)
         return Tick(run.number, index, time_s, self._effective_s, waited_for_s, silent, bodies)

@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +10,16 @@ import numpy as np
 from manipnet.actor import Actor
 from manipnet.config import default_actor
 from manipnet.flight_recorder import FlightRecorder
+from manipnet.hand.joint_sets import pose_in_world
+from manipnet.ik.pose import pose_by_least_squares, room_for_poses
 from manipnet.mailbox import Mailbox
 from manipnet.network.bundle import Bundle
+from manipnet.network.layout import INPUT_SIZE
 from manipnet.objects.shape import Shape
 from manipnet.props import Prop
 from manipnet.streams.bodies import BodyFrame, BodySample
 from manipnet.streams.wire import encode_binary, encode_msgpack
-from manipnet.synthesis import Synthesizer
+from manipnet.synthesis import HandScene, Synthesizer, state_of, windows_of
 from manipnet.telemetry import Counters, StageClock, Timings
 from manipnet.tick_loop import TickLoop
 
@@ -24,12 +27,21 @@ FRAMES = 120
 """Two hands at a prop for one second: about thirty ticks."""
 
 
-def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
-    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
+LOOK_AHEAD_S = 0.4
+"""So that there is something to forecast."""
+
+
+def warm_up(bundle: Bundle, shapes: Sequence[Shape], sensing_compiled: Callable[[], object] = lambda: None) -> None:
+    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to.
+
+    `sensing_compiled` returns once another process has compiled what hands sense with.
+    """
+    _pose_a_hand(bundle, shapes[0])
+    sensing_compiled()
     for shape in shapes:
         counters, timings = Counters(), Timings()
         mailbox = Mailbox(counters)
-        actor = Actor(default_actor(), [Prop("prop", shape.name, shape)], bundle, counters, 0.5)
+        actor = Actor(default_actor(), [Prop("prop", shape.name, shape)], bundle, counters, LOOK_AHEAD_S)
         actor.carry("prop", shape.name, shape, 1.0)
         stages = StageClock(timings)
         loop = TickLoop(
@@ -50,6 +62,16 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
             loop.take_in(0.0)
             while loop.step(start_s + t_s):
                 pass
+
+
+def _pose_a_hand(bundle: Bundle, shape: Shape) -> None:
+    """All that a tick does after sensing."""
+    rest, still = state_of(bundle.rest_angles), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
+    windows = windows_of([HandScene("right", still, still, still, shape)])
+    outputs, before, poses = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), rest.angles[None], room_for_poses(1)
+    poses.correction[:] = 0.0
+    pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
+    pose_in_world(["right"], poses.angles, still[:1], 1.0)
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

@@ -64,6 +64,16 @@ def test_folds_keep_test_frames_out_of_training(cases):
     assert [(fold.name, [case.name for case in fold.train]) for fold in unseen] == [("mug1", ["cyl_med3"])]
 
 
+def test_a_sweep_is_drawn(results, tmp_path):
+    pytest.importorskip("matplotlib")
+    from manipnet_tools import plots
+
+    rows = {"0.5 s": results.rows[HOLD].average, "0 s": results.rows[MEAN].average}
+    path = plots.write_sweep("look-ahead", rows, tmp_path / "plots")
+    assert path.name == "sweep-look-ahead.png"
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
 def test_a_sweep_changes_the_input_and_not_the_truth(cases, manipnet_data):
     from manipnet_tools.takes import read_take
 

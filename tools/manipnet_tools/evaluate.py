@@ -188,6 +188,10 @@ def _sweep(options: EvaluateOptions, name: Sweep, progress: Progress) -> tuple[d
     task = progress.add_task(name, total=sweeps.hand_ticks(name, subjects))
     steps = sweeps.sweep(name, subjects, bundle, options.solver[0], lambda n: progress.advance(task, n))
     rows = dict(steps)
+    if options.plots:
+        from manipnet_tools import plots
+
+        progress.console.print(f"wrote {plots.write_sweep(name, rows, options.plots)}")
     title = f"{name}: {row_name(bundle.name, options.solver[0])}, last 20 % of {len(subjects)} takes"
     return {"sweep": name, "rows": report.plain(rows)}, [report.table_of(title, rows)]
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from manipnet_tools.evaluate import Results
+    from manipnet_tools.scoring import Score
 
 PRESSED = (0.78, 0.16, 0.12)
 CAPSULE_NAMES = [
@@ -54,6 +55,28 @@ def write_all(results: "Results", ours: str, folder: Path) -> Iterator[Path]:
     path = folder / f"{results.protocol}-worst-frames.png"
     save_png(_worst_frames(results, ours), path)
     yield path
+
+
+def write_sweep(name: str, rows: "dict[str, Score]", folder: Path) -> Path:
+    """Joint error and contacts at every step of a sweep, as `sweep-NAME.png` in `folder`, made if needed."""
+    from matplotlib.figure import Figure
+
+    folder.mkdir(parents=True, exist_ok=True)
+    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+    errors, contacts = figure.subplots(1, 2)
+    for label, measure in (("all joints", "mpjpe_mm"), ("near the object", "near_mm"), ("fingertips", "tip_mm")):
+        errors.plot(list(rows), [getattr(score, measure) for score in rows.values()], marker="o", label=label)
+    contacts.plot(list(rows), [score.contact_f1 for score in rows.values()], marker="o", color="tab:green")
+    for axes, what in ((errors, "error, mm"), (contacts, "contact F1")):
+        axes.set_ylabel(what)
+        axes.set_ylim(bottom=0.0)
+        axes.set_xlabel(name)
+        axes.tick_params(axis="x", rotation=30)
+        axes.grid(alpha=0.3)
+    errors.legend()
+    path = folder / f"sweep-{name}.png"
+    figure.savefig(path, dpi=110)
+    return path
 
 
 def _figure(case: Case, height: float) -> "tuple[Figure, list[tuple[Side, Axes]]]":

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from manipnet.geometry import MIRROR, Array, quat_rotate, quat_to_matrix
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.ik.least_squares import solve_least_squares
-from manipnet.kernels import njit
+from manipnet.kernels import kernel
 from manipnet.objects.mesh import closed_mesh
 from manipnet.objects.shape import Shape, build_shape
 from manipnet.sensing.scene import object_from_wrist
@@ -92,7 +92,7 @@ def _solve(hand: HandTrack, targets: Array) -> Array:
     return hand.angles + gaussian_filter1d(solved - hand.angles, _FINGER_SMOOTHING, axis=0)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _solve_frames(angles, targets, wrist, obj, mirrored, limits, field):
     rotation, translation = np.empty((3, 3)), np.empty(3)
     local, identity = np.empty((22, 3)), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -105,4 +105,5 @@ def _solve_frames(angles, targets, wrist, obj, mirrored, limits, field):
         for j in range(22):
             local[j] = to_wrist @ targets[t, j] + origin
         for _ in range(2):
-            solve_least_squares(angles[t], local, apart, 0.0, limits, field, rotation, translation, 1.0)
+            start = angles[t].copy()
+            solve_least_squares(start, local, apart, 0.0, limits, field, rotation, translation, 1.0, angles[t])

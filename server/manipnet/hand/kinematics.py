@@ -17,14 +17,14 @@ from manipnet.hand.skeleton import (
     PARENTS,
     REST_QUATS,
 )
-from manipnet.kernels import njit
+from manipnet.kernels import inner, kernel
 
 _REST = quat_to_matrix(REST_QUATS)
 _FIRST_DOF = np.array([int(np.argmax(j == DOF_JOINTS)) if j in DOF_JOINTS else -1 for j in range(BONE_COUNT)])
 _DOFS_OF_BONE = np.array([int(np.sum(j == DOF_JOINTS)) for j in range(BONE_COUNT)])
 
 
-@njit(cache=True, nogil=True)
+@inner
 def axis_rotation_into(axis, angle, out):
     """Rodrigues' formula: the matrix turning by `angle` about the unit `axis`, into `out` `(3, 3)`."""
     c, s = np.cos(angle), np.sin(angle)
@@ -35,7 +35,7 @@ def axis_rotation_into(axis, angle, out):
     out[2, 0], out[2, 1], out[2, 2] = z * x * k - y * s, z * y * k + x * s, c + z * z * k
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _copy_into(a, out):
     # a slice assignment would compile numpy's broadcasting, with its error texts, for seconds
     for i in range(3):
@@ -43,7 +43,7 @@ def _copy_into(a, out):
             out[i, j] = a[i, j]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def set_identity(out):
     """The identity into `out (3, 3)`."""
     for i in range(3):
@@ -51,14 +51,14 @@ def set_identity(out):
             out[i, j] = 1.0 if i == j else 0.0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _multiply_into(a, b, out):
     for i in range(3):
         for j in range(3):
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _apply_offset_into(parent_position, parent_rotation, offset, out):
     for i in range(3):
         out[i] = parent_position[i] + (
@@ -66,7 +66,7 @@ def _apply_offset_into(parent_position, parent_rotation, offset, out):
         )
 
 
-@njit(cache=True, nogil=True)
+@inner
 def forward_kinematics_into(angles, positions, rotations, axes):
     """Pose of one hand: `angles (20,)` into `positions (22, 3)`, `rotations (17, 3, 3)`, hinge `axes (20, 3)`."""
     hinge, turned = np.empty((3, 3)), np.empty((3, 3))
@@ -92,7 +92,7 @@ def forward_kinematics_into(angles, positions, rotations, axes):
         _apply_offset_into(positions[parent], rotations[parent], OFFSETS_M[tip], positions[tip])
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _hinge_angle(m, axis):
     """Angle about `axis` of the rotation nearest to the matrix `m`: the maximiser of trace(R(angle)ᵀ m)."""
     x, y, z = axis[0], axis[1], axis[2]
@@ -104,7 +104,7 @@ def _hinge_angle(m, axis):
     return np.arctan2(sine, m[0, 0] + m[1, 1] + m[2, 2] - along)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _turn_about(u, v, m):
     """Angle about the unit axis `u` that turns `v` into the direction of `m v`, seen along the axis."""
     x = m[0, 0] * v[0] + m[0, 1] * v[1] + m[0, 2] * v[2]
@@ -115,7 +115,7 @@ def _turn_about(u, v, m):
     return np.arctan2(sine, v[0] * x + v[1] * y + v[2] * z - along)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def angles_from_rotations_into(rotations, angles):
     """The 20 angles whose hand is nearest to bone `rotations (17, 3, 3)`, joint by joint, into `angles (20,)`."""
     local, work, back = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -143,14 +143,14 @@ def angles_from_rotations_into(rotations, angles):
             angles[first] = _hinge_angle(local, DOF_AXES[first])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _forward_batch(angles, positions, rotations):
     axes = np.empty((DOF_COUNT, 3))
     for i in range(len(angles)):
         forward_kinematics_into(angles[i], positions[i], rotations[i], axes)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _angles_batch(rotations, angles):
     for i in range(len(rotations)):
         angles_from_rotations_into(rotations[i], angles[i])

@@ -4,6 +4,7 @@ The data is made by `manipnet_tools.make_hand` from the skeleton; the sensors ar
 changing them makes every bundle unusable.
 """
 
+from functools import cache
 from importlib.resources import as_file, files
 from typing import Final
 
@@ -31,12 +32,16 @@ SENSOR_POINTS: Final = _data["sensor_points"]
 SENSOR_NORMALS: Final = _data["sensor_normals"]
 """Position and outward normal of each sensor in the frame of each of its bones, `(104, 2, 3)`."""
 
-_BIND_POSITIONS, _BIND_ROTATIONS = forward_kinematics(BIND_ANGLES_RAD)
-_IN_BONE: Final = np.einsum("vkji,vkj->vki", _BIND_ROTATIONS[BONES], VERTICES[:, None] - _BIND_POSITIONS[BONES])
+
+@cache
+def _vertices_in_bones() -> Array:
+    """Every vertex in the frame of each bone it follows, `(V, 4, 3)`."""
+    positions, rotations = forward_kinematics(BIND_ANGLES_RAD)
+    return np.einsum("vkji,vkj->vki", rotations[BONES], VERTICES[:, None] - positions[BONES])
 
 
 def skin(positions: Array, rotations: Array) -> Array:
     """Linear blend skinning: vertices `(..., V, 3)` of a hand with joints `positions (..., 22, 3)` and bone `rotations
     (..., 17, 3, 3)`, in whatever frame those are in (a left hand mirrored as a whole afterwards)."""
-    moved = np.einsum("...vkij,vkj->...vki", rotations[..., BONES, :, :], _IN_BONE) + positions[..., BONES, :]
-    return np.sum(WEIGHTS[..., None] * moved, axis=-2)
+    turned = np.einsum("...vkij,vkj->...vki", rotations[..., BONES, :, :], _vertices_in_bones())
+    return np.sum(WEIGHTS[..., None] * (turned + positions[..., BONES, :]), axis=-2)

@@ -9,12 +9,12 @@ import numpy as np
 from manipnet.hand.kinematics import forward_kinematics_into
 from manipnet.hand.skeleton import BONE_COUNT, DOF_COUNT, DOF_JOINTS, PARENTS
 from manipnet.ik.chains import DOFS, FINGERS, MOVED_JOINTS, clamp, dof_moves
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 
 SWEEPS = 8
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _best_turn(origin, axis, positions, targets, finger, dof):
     sine = cosine = 0.0
     for j in MOVED_JOINTS[finger]:
@@ -27,9 +27,11 @@ def _best_turn(origin, axis, positions, targets, finger, dof):
     return np.arctan2(sine, cosine) if sine != 0.0 or cosine != 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True)
-def solve_ccd(angles, targets, limits):
-    """Move `angles (20,)` in place until the joints are near `targets (22, 3)`, inside `limits (20, 2)`."""
+@inner
+def solve_ccd(start, targets, limits, angles):
+    """From `start (20,)` to `angles (20,)` whose joints are near `targets (22, 3)`, inside `limits (20, 2)`."""
+    for dof in range(DOF_COUNT):
+        angles[dof] = start[dof]
     positions, rotations = np.empty((22, 3)), np.empty((BONE_COUNT, 3, 3))
     axes = np.empty((DOF_COUNT, 3))
     for _ in range(SWEEPS):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from manipnet.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, DOF_JOINTS, FINGER_JOINTS
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 
 FINGERS = 5
 DOFS = 4
@@ -18,13 +18,13 @@ CAPSULE_STARTS, CAPSULE_ENDS = CAPSULE_JOINTS[:, 0].copy(), CAPSULE_JOINTS[:, 1]
 CAPSULE_RADII = CAPSULE_RADII_M.copy()
 
 
-@njit(cache=True, nogil=True)
+@inner
 def dof_moves(dof, bone):
     """Whether the angle turns `bone` (both of one finger)."""
     return DOF_JOINTS[dof] <= bone
 
 
-@njit(cache=True, nogil=True)
+@inner
 def clamp(value, limits, dof):
     """`value` inside the limits `(20, 2)` of an angle."""
     return min(max(value, limits[dof, 0]), limits[dof, 1])

@@ -7,7 +7,7 @@ of such frames. Then the thumb and whichever fingers are nearest belong on its s
 import numpy as np
 
 from manipnet.ik.chains import CAPSULE_ENDS, CAPSULE_RADII, CAPSULE_STARTS, CAPSULES, FINGERS
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 from manipnet.sensing.scene import quat_to_matrix_into
 
 ARM_M = 0.05
@@ -23,7 +23,7 @@ TAKES_PART_M = 0.010
 _POINTS = 4
 
 
-@njit(cache=True, nogil=True)
+@inner
 def hold_share(wrist, obj):
     """How sure it is, 0 to 1, that the hand with poses `wrist (21, 7)` holds the object with poses `obj (21, 7)`."""
     w, o = np.empty((3, 3)), np.empty((3, 3))
@@ -54,7 +54,7 @@ def hold_share(wrist, obj):
     return moves * together
 
 
-@njit(cache=True, nogil=True)
+@inner
 def grip_into(distances, hold, grip):
     """How much each finger takes part in a hold, `grip (5,)`: the thumb, and the fingers that predicted joint
     `distances (22,)` bring nearest."""

@@ -20,7 +20,7 @@ from manipnet.ik.chains import (
     dof_moves,
 )
 from manipnet.ik.grip import grip_into
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 from manipnet.objects.field import field_distance
 from manipnet.sensing.scene import map_direction_back, map_point
 
@@ -45,13 +45,13 @@ GRIP_REACH_M = 0.030
 _MAX_STEP_RAD = 0.2
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _jacobian_column(axis, origin, x, y, z):
     rx, ry, rz = x - origin[0], y - origin[1], z - origin[2]
     return axis[1] * rz - axis[2] * ry, axis[2] * rx - axis[0] * rz, axis[0] * ry - axis[1] * rx
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _add_targets(finger, positions, axes, targets, normal, slope):
     for j in MOVED_JOINTS[finger]:
         if j < 0:
@@ -72,7 +72,7 @@ def _add_targets(finger, positions, axes, targets, normal, slope):
                     normal[a, b] += TARGET_WEIGHT * columns[a, i] * columns[b, i]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _add_surface(finger, positions, axes, distances, grip, field, rotation, translation, scale, normal, slope):
     row = np.empty(DOFS)
     reach = PULL_REACH_M + grip * (GRIP_REACH_M - PULL_REACH_M)
@@ -106,7 +106,7 @@ def _add_surface(finger, positions, axes, distances, grip, field, rotation, tran
                     normal[a, b] += weight * row[a] * row[b]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _solve_in_place(normal, slope):
     """Cholesky solve of the positive definite 4 x 4 system; the solution replaces `slope`."""
     for i in range(DOFS):
@@ -125,11 +125,12 @@ def _solve_in_place(normal, slope):
         slope[i] /= normal[i, i]
 
 
-@njit(cache=True, nogil=True)
-def solve_least_squares(angles, targets, distances, hold, limits, field, rotation, translation, scale):
-    """Move `angles (20,)` in place toward joint `targets (22, 3)`, inside `limits (20, 2)`, out of the object, and
-    onto it where predicted `distances (22,)` or the share `hold` of a grip say so."""
-    start = angles.copy()
+@inner
+def solve_least_squares(start, targets, distances, hold, limits, field, rotation, translation, scale, angles):
+    """From the angles `start (20,)` to `angles (20,)` toward joint `targets (22, 3)`, inside `limits (20, 2)`, out of
+    the object, and onto it where predicted `distances (22,)` or the share `hold` of a grip say so."""
+    for dof in range(DOF_COUNT):
+        angles[dof] = start[dof]
     positions, rotations = np.empty((22, 3)), np.empty((BONE_COUNT, 3, 3))
     axes = np.empty((DOF_COUNT, 3))
     normal, slope, grip = np.empty((DOFS, DOFS)), np.empty(DOFS), np.empty(FINGERS)

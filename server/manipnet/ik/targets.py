@@ -1,6 +1,6 @@
 """Where the joints should go: the network's positions corrected by its distances (paper, appendix B, algorithm 1)."""
 
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 from manipnet.objects.field import signed_distance
 from manipnet.sensing.scene import map_direction_back, map_point
 
@@ -8,7 +8,7 @@ NEAR_M = 0.028
 """A predicted distance above this leaves the joint where the network put it."""
 
 
-@njit(cache=True, nogil=True)
+@inner
 def mix_distances(predicted, measured):
     """Final distance of a joint: trust the prediction when the position is inside the object, else the position."""
     if measured < 0.0:
@@ -16,8 +16,8 @@ def mix_distances(predicted, measured):
     return 0.2 * predicted + 0.8 * measured
 
 
-@njit(cache=True, nogil=True)
-def place_targets(bvh, field, rotation, translation, scale, exact_within_m, positions, distances, targets):
+@inner
+def place_targets(solid, rotation, translation, scale, positions, distances, targets):
     """Targets `(22, 3)` in the wrist frame from predicted joint `positions (22, 3)` and `distances (22,)`, metres."""
     for j in range(len(positions)):
         for i in range(3):
@@ -25,7 +25,7 @@ def place_targets(bvh, field, rotation, translation, scale, exact_within_m, posi
         if distances[j] > NEAR_M:
             continue
         x, y, z = map_point(rotation, translation, scale, positions[j, 0], positions[j, 1], positions[j, 2])
-        measured, nx, ny, nz = signed_distance(bvh, field, x, y, z, exact_within_m)
+        measured, nx, ny, nz = signed_distance(solid.bvh, solid.field, x, y, z, solid.exact_within_m)
         nx, ny, nz = map_direction_back(rotation, nx, ny, nz)
         step = mix_distances(distances[j], measured * scale) - measured * scale
         targets[j, 0] += step * nx

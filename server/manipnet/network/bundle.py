@@ -2,9 +2,10 @@
 
 import hashlib
 import json
+import logging
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import onnxruntime
@@ -15,6 +16,12 @@ from manipnet.network.layout import INPUT_SIZE, OUTPUT_SIZE, describe
 
 FORMAT = 1
 DEFAULT_MODEL = "manipnet-small"
+
+Provider = Literal["auto", "cpu", "cuda"]
+PROVIDERS: tuple[Provider, ...] = ("auto", "cpu", "cuda")
+"""What a network runs on; `auto` is an NVIDIA GPU where the extra `gpu` is installed and works, else the processor."""
+_CPU, _CUDA = "CPUExecutionProvider", "CUDAExecutionProvider"
+_log = logging.getLogger(__name__)
 
 
 class BundleError(ValueError):
@@ -37,6 +44,11 @@ class Bundle:
     session: onnxruntime.InferenceSession
     folder: Path
 
+    @property
+    def provider(self) -> Provider:
+        """What it runs on: `cpu` or `cuda`."""
+        return "cuda" if self.session.get_providers()[0] == _CUDA else "cpu"
+
     def infer(self, rows: np.ndarray) -> np.ndarray:
         """Network outputs `(N, 220)` of feature rows `(N, 2356)` float32, both in SI units."""
         return np.asarray(self.session.run(None, {"features": rows})[0])
@@ -49,8 +61,12 @@ def models_folder() -> Path:
     return installed if installed.is_dir() else package.parents[1] / "models"
 
 
-def load_bundle(model: Path | str = DEFAULT_MODEL, providers: tuple[str, ...] = ("CPUExecutionProvider",)) -> Bundle:
-    """Load a bundle by folder or by the name of a shipped one. Raises `BundleError`."""
+def load_bundle(model: Path | str = DEFAULT_MODEL, provider: Provider = "cpu") -> Bundle:
+    """Load a bundle by folder or by the name of a shipped one. Raises `BundleError`.
+
+    Where a GPU was asked for or is expected and cannot be had, a line of the log says why, and it runs on the
+    processor.
+    """
     folder = Path(model)
     if not folder.is_dir():
         folder = models_folder() / str(model)
@@ -66,25 +82,38 @@ def load_bundle(model: Path | str = DEFAULT_MODEL, providers: tuple[str, ...] = 
     model_hash = hashlib.sha256(content).hexdigest()
     if meta.get("model_sha256") != model_hash:
         raise BundleError(f"{path}: its hash is not the one in bundle.json; the bundle is damaged, copy it again")
-    session = open_session(path, content, providers)
+    session = open_session(path, content, provider)
     return Bundle(folder.name, *_read_pose(folder, meta), meta, model_hash, session, folder)
 
 
-def open_session(
-    path: Path | str, content: bytes, providers: tuple[str, ...] = ("CPUExecutionProvider",)
-) -> onnxruntime.InferenceSession:
+def open_session(path: Path | str, content: bytes, provider: Provider = "cpu") -> onnxruntime.InferenceSession:
     """A graph on one thread; raises `BundleError`, naming `path`, for one that is not of the feature layout."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3
+    providers = _providers(provider)
     try:
-        session = onnxruntime.InferenceSession(content, options, providers=list(providers))
+        session = onnxruntime.InferenceSession(content, options, providers=providers)
     except Exception as error:  # the runtime raises its own zoo of exceptions for a bad graph
         raise BundleError(f"{path}: not a model this runtime can open ({error})") from None
+    if session.get_providers()[0] != providers[0]:
+        _log.warning("CUDA could not be started (driver or CUDA libraries missing); the network runs on the processor")
     sizes = [node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())]
     if sizes != [INPUT_SIZE, OUTPUT_SIZE]:
         raise BundleError(f"{path}: takes and gives {sizes} numbers; expected are {[INPUT_SIZE, OUTPUT_SIZE]}")
     return session
+
+
+def _providers(asked: Provider) -> list[str]:
+    """ONNX Runtime's names, the preferred one first."""
+    if asked != "cpu" and _CUDA in onnxruntime.get_available_providers():
+        return [_CUDA, _CPU]
+    if asked == "cuda":
+        _log.warning(
+            "the provider cuda is not installed (python -m pip install 'manipnet-live[gpu]'); the network runs on the "
+            "processor"
+        )
+    return [_CPU]
 
 
 def _read_meta(path: Path) -> dict[str, Any]:

@@ -4,27 +4,29 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.hand.kinematics import angles_from_rotations_into, set_identity
-from manipnet.kernels import njit
+from manipnet.kernels import inner, kernel
 from manipnet.network.layout import OUTPUT, OUTPUT_DISTANCE_MAX_M
 
 _AXES, _DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _rotations_into(output, rotations):
     """Rotations `(17, 3, 3)` from the two axes per bone, by Gram and Schmidt; the wrist is the frame itself."""
     set_identity(rotations[0])
     for bone in range(1, 17):
-        at = _AXES + 6 * bone
         r = rotations[bone]
-        length = max(np.sqrt(output[at] ** 2 + output[at + 1] ** 2 + output[at + 2] ** 2), 1e-9)
+        for i in range(3):
+            for column in range(2):
+                r[i, column] = output[_AXES + 6 * bone + 3 * column + i]
+        length = max(np.sqrt(r[0, 0] ** 2 + r[1, 0] ** 2 + r[2, 0] ** 2), 1e-9)
         along = 0.0
         for i in range(3):
-            r[i, 0] = output[at + i] / length
-            along += r[i, 0] * output[at + 3 + i]
+            r[i, 0] /= length
+            along += r[i, 0] * r[i, 1]
         length = 0.0
         for i in range(3):
-            r[i, 1] = output[at + 3 + i] - along * r[i, 0]
+            r[i, 1] -= along * r[i, 0]
             length += r[i, 1] ** 2
         length = max(np.sqrt(length), 1e-9)
         for i in range(3):
@@ -34,7 +36,7 @@ def _rotations_into(output, rotations):
         r[2, 2] = r[0, 0] * r[1, 1] - r[1, 0] * r[0, 1]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def decode_into(output, before, response, limits, rotations, angles, distances):
     """One hand: `output (220,)` into `angles (20,)`, a share `response` of the way from `before (20,)` and inside
     `limits (20, 2)`, and `distances (22,)` in metres; `rotations (17, 3, 3)` is room to work in."""
@@ -47,9 +49,15 @@ def decode_into(output, before, response, limits, rotations, angles, distances):
         distances[j] = min(max(output[_DISTANCES + j], 0.0), OUTPUT_DISTANCE_MAX_M)
 
 
+@kernel
+def _decode_batch(outputs, limits, angles):
+    distances, rotations = np.empty(22), np.empty((17, 3, 3))
+    for n in range(len(outputs)):
+        decode_into(outputs[n], limits[:, 0], 1.0, limits, rotations, angles[n], distances)
+
+
 def angles_from_outputs(outputs: Array, limits: Array) -> Array:
     """Angles `(N, 20)` inside `limits` that network outputs `(N, 220)` say, without smoothing."""
-    angles, distances, rotations = np.empty((len(outputs), 20)), np.empty(22), np.empty((17, 3, 3))
-    for output, into in zip(outputs, angles, strict=True):
-        decode_into(output, limits[:, 0], 1.0, limits, rotations, into, distances)
+    angles = np.empty((len(outputs), 20))
+    _decode_batch(outputs, limits, angles)
     return angles

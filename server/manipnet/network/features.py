@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import njit
+from manipnet.kernels import inner, kernel
 from manipnet.network.layout import (
     INPUT,
     INPUT_SIZE,
@@ -23,13 +23,14 @@ from manipnet.network.layout import (
 from manipnet.objects.shape import Shape
 from manipnet.sensing.ambient import sense_ambient
 from manipnet.sensing.distance import sense_distances
-from manipnet.sensing.proximity import SENSOR_COUNT, SENSORS, aim_rays, place_sensors, proximity
+from manipnet.sensing.proximity import SENSOR_COUNT, SENSORS, Rays, aim_rays, place_sensors, read_rays, room_for_rays
 from manipnet.sensing.scene import object_from_wrist, quat_to_matrix_into
 
 _POSITIONS, _AXES = INPUT["joint_positions"].start, INPUT["joint_axes"].start
 _WRIST_POSITIONS, _WRIST_AXES = INPUT["wrist_positions"].start, INPUT["wrist_axes"].start
 _OTHER, _CENTERS = INPUT["other_wrist_distances"].start, INPUT["object_centers"].start
 _SPINS, _AMBIENT = INPUT["object_angular_velocities"].start, INPUT["ambient"].start
+_PROXIMITY = INPUT["proximity"].start
 _DISTANCES, _NORMALS = INPUT["signed_distances"].start, INPUT["surface_normals"].start
 _OUT_AXES, _OUT_DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
 _WINDOW, _SENSED_COUNT = 21, len(SENSED)
@@ -50,6 +51,9 @@ class Windows(NamedTuple):
     """`(N,)` scale of the object."""
 
 
+RAYS_PER_HAND = _SENSED_COUNT * SENSOR_COUNT
+
+
 def features(shape: Shape, windows: Windows, positions: Array, rotations: Array) -> np.ndarray:
     """Network inputs `(N, 2356)` float32 of hands that all face `shape`.
 
@@ -57,56 +61,57 @@ def features(shape: Shape, windows: Windows, positions: Array, rotations: Array)
     """
     count = len(positions)
     rows = np.empty((count, INPUT_SIZE), np.float32)
-    rays = np.empty((2, count, _SENSED_COUNT, SENSOR_COUNT, 3), np.float32)
-    _features_without_rays(
-        SENSORS,
-        shape.bvh,
-        shape.field,
-        shape.exact_within_m,
-        shape.center_of_mass,
-        windows,
-        positions,
-        rotations,
-        rows,
-        rays,
-    )
-    scale = np.repeat(windows.scale, _SENSED_COUNT * SENSOR_COUNT)
-    readings = proximity(shape.rays, rays[0].reshape(-1, 3), rays[1].reshape(-1, 3), scale)
-    rows[:, INPUT["proximity"].columns] = readings.reshape(count, -1)
+    sense(shape, windows, positions, rotations, 0, count, room_for_rays(count * RAYS_PER_HAND + 1), rows)
     return rows
+
+
+def sense(
+    shape: Shape,
+    windows: Windows,
+    positions: Array,
+    rotations: Array,
+    first: int,
+    last: int,
+    rays: Rays,
+    rows: np.ndarray,
+) -> None:
+    """Features of the hands `first … last - 1`, which all face `shape`, into those `rows (N, 2356)` of `N` hands.
+
+    `rays` is room for one ray more than `RAYS_PER_HAND` of each of them.
+    """
+    traced = _all_but_readings(SENSORS, shape.solid, windows, positions, rotations, first, last, rays, rows)
+    read_rays(shape.rays, rays, traced, windows.scale, rows)
 
 
 def pose_outputs(positions: Array, rotations: Array, distances: Array) -> np.ndarray:
     """Network outputs `(N, 220)` float32 that say a pose and its signed joint distances `(N, 22)`."""
     rows = np.empty((len(positions), OUTPUT_SIZE), np.float32)
-    _pose_rows(positions, rotations, rows)
+    _all_pose_rows(positions, rotations, rows)
     rows[:, OUTPUT["distances"].columns] = np.clip(distances, 0.0, OUTPUT_DISTANCE_MAX_M)
     return rows
 
 
 def joint_distances(shape: Shape, windows: Windows, positions: Array) -> Array:
     """Signed distances `(N, 22)` of joints at the present tick, metres, clamped at +10 cm."""
-    distances, normals = np.empty((len(positions), 22)), np.empty((22, 3))
-    _present_distances(shape.bvh, shape.field, windows, positions, distances, normals)
+    distances = np.empty((len(positions), 22))
+    _present_distances(shape.solid, windows, positions, distances)
     return distances
 
 
-@njit(cache=True, nogil=True)
-def _present_distances(bvh, field, windows, positions, distances, normals):
-    rotation, translation = np.empty((3, 3)), np.empty(3)
+@kernel
+def _present_distances(solid, windows, positions, distances):
+    rotation, translation, normals = np.empty((3, 3)), np.empty(3), np.empty((22, 3))
     for n in range(len(positions)):
         object_from_wrist(
             windows.wrist[n, PRESENT], windows.object[n, PRESENT], windows.mirrored[n], rotation, translation
         )
-        sense_distances(
-            bvh, field, rotation, translation, windows.scale[n], np.inf, positions[n], distances[n], normals
-        )
+        sense_distances(solid, np.inf, rotation, translation, windows.scale[n], positions[n], distances[n], normals)
 
 
-@njit(cache=True, nogil=True)
-def _pose_rows(positions, rotations, rows):
+@inner
+def _pose_rows(positions, rotations, first, last, rows):
     """Joint positions and the first two axes of every bone, tips carrying their parent's."""
-    for n in range(len(positions)):
+    for n in range(first, last):
         for j in range(22):
             # the tips follow joints 4, 7, 10, 13, 16
             bone = j if j < 17 else 3 * (j - 17) + 4
@@ -116,7 +121,12 @@ def _pose_rows(positions, rotations, rows):
                 rows[n, _OUT_AXES + 6 * j + 3 + i] = rotations[n, bone, i, 1]
 
 
-@njit(cache=True, nogil=True)
+@kernel
+def _all_pose_rows(positions, rotations, rows):
+    _pose_rows(positions, rotations, 0, len(rows), rows)
+
+
+@inner
 def _rotation_vector_into(m, out):
     """Logarithm of a rotation matrix by way of its quaternion's vector part; exact for the small turns of a window."""
     x, y, z = 0.5 * (m[2, 1] - m[1, 2]), 0.5 * (m[0, 2] - m[2, 0]), 0.5 * (m[1, 0] - m[0, 1])
@@ -126,7 +136,7 @@ def _rotation_vector_into(m, out):
     out[0], out[1], out[2] = factor * x, factor * y, factor * z
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
     w0, w, o = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     before, turn, spin, center = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
@@ -170,35 +180,30 @@ def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
         row[_OTHER + t] = np.sqrt(apart)
 
 
-@njit(cache=True, nogil=True)
-def _features_without_rays(
-    sensors, bvh, field, exact_within_m, center_of_mass, windows, positions, rotations, rows, rays
-):
+@kernel
+def _all_but_readings(sensors, solid, windows, positions, rotations, first, last, rays, rows):
+    """Every block of some rows but the readings of rays that have to be traced; returns how many these are."""
     rotation, translation = np.empty((3, 3)), np.empty(3)
     points, directions = np.empty((SENSOR_COUNT, 3)), np.empty((SENSOR_COUNT, 3))
     distances, normals = np.empty(22), np.empty((22, 3))
-    _pose_rows(positions, rotations, rows)
-    for n in range(len(positions)):
-        row, scale = rows[n], windows.scale[n]
-        _trajectory_row(
-            windows.wrist[n],
-            windows.other_wrist[n],
-            windows.object[n],
-            windows.mirrored[n],
-            scale,
-            center_of_mass,
-            row,
-        )
+    box, traced = solid.bvh.boxes[0], 0
+    _pose_rows(positions, rotations, first, last, rows)
+    for n in range(first, last):
+        row, mirrored, scale = rows[n], windows.mirrored[n], windows.scale[n]
+        wrist, obj = windows.wrist[n], windows.object[n]
+        _trajectory_row(wrist, windows.other_wrist[n], obj, mirrored, scale, solid.center_of_mass, row)
         place_sensors(sensors, positions[n], rotations[n], points, directions)
         for s in range(_SENSED_COUNT):
             t = SENSED[s]
-            object_from_wrist(windows.wrist[n, t], windows.object[n, t], windows.mirrored[n], rotation, translation)
-            aim_rays(rotation, translation, scale, points, directions, rays[0, n, s], rays[1, n, s])
-            sense_distances(bvh, field, rotation, translation, scale, exact_within_m, positions[n], distances, normals)
+            object_from_wrist(wrist[t], obj[t], mirrored, rotation, translation)
+            column = _PROXIMITY + SENSOR_COUNT * s
+            traced = aim_rays(box, rotation, translation, scale, points, directions, n, row, column, rays, traced)
+            sense_distances(solid, solid.exact_within_m, rotation, translation, scale, positions[n], distances, normals)
             for j in range(22):
                 row[_DISTANCES + 22 * s + j] = distances[j]
             if s == 0:
-                sense_ambient(field, rotation, translation, scale, row[_AMBIENT : _AMBIENT + 1000])
+                sense_ambient(solid.field, rotation, translation, scale, row[_AMBIENT : _AMBIENT + 1000])
                 for j in range(22):
                     for i in range(3):
                         row[_NORMALS + 3 * j + i] = normals[j, i]
+    return traced

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 
 _BINS = 12
 _LEAF_TRIANGLES = 3
@@ -135,7 +135,7 @@ def pseudo_normals(vertices: Array, faces: np.ndarray) -> Array:
     return normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-30)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _closest_on_triangle(px, py, pz, t, f):
     """Closest point of triangle `t[f]` of `t (F, 3, 3)`: coordinates and region (0 face, 1-3 edges, 4-6 corners).
 
@@ -181,7 +181,7 @@ def _closest_on_triangle(px, py, pz, t, f):
     return ax + abx * v + acx * w, ay + aby * v + acy * w, az + abz * v + acz * w, 0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _box_distance_squared(boxes, node, px, py, pz):
     x = max(boxes[node, 0] - px, 0.0, px - boxes[node, 3])
     y = max(boxes[node, 1] - py, 0.0, py - boxes[node, 4])
@@ -189,7 +189,7 @@ def _box_distance_squared(boxes, node, px, py, pz):
     return x * x + y * y + z * z
 
 
-@njit(cache=True, nogil=True)
+@inner
 def closest_point(bvh, px, py, pz, seed):
     """Signed distance, closest point and its triangle for one query; `seed` is a triangle guessed to be near, or -1.
 
@@ -232,7 +232,7 @@ def closest_point(bvh, px, py, pz, seed):
     return (-distance if side < 0.0 else distance), bx, by, bz, triangle, region
 
 
-@njit(cache=True, nogil=True)
+@inner
 def trace_ray(bvh, ox, oy, oz, dx, dy, dz):
     """First hit of one ray (Möller and Trumbore 1997): distance along the unit direction, `inf` without a hit, and
     the triangle."""

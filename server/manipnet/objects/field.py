@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import njit
+from manipnet.kernels import inner, kernel
 from manipnet.objects.bvh import Bvh, closest_point
 
 MARGIN_M = 0.12
@@ -51,7 +51,7 @@ def build_field(bvh: Bvh) -> Field:
     return Field(lower, cell, distance, triangle)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _sample(bvh, lower, cell, slab, distance, triangle):
     """Unsigned distances and nearest triangles of the grid points with first index in `slab`."""
     near = -1
@@ -93,7 +93,7 @@ def _cross(a: Array, b: Array) -> Array:
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def field_distance(field, px, py, pz):
     """Trilinear signed distance and its gradient at one point: `(distance, gx, gy, gz)`; clamped outside the grid."""
     d, cell = field.distance, field.cell_m
@@ -113,7 +113,7 @@ def field_distance(field, px, py, pz):
     return d0 + w * (d1 - d0), gx / cell, gy / cell, (d1 - d0) / cell
 
 
-@njit(cache=True, nogil=True)
+@inner
 def signed_distance(bvh, field, px, py, pz, exact_within_m):
     """Signed distance and outward unit direction at one point: `(distance, nx, ny, nz)`.
 

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import njit
+from manipnet.kernels import kernel
 from manipnet.objects.bvh import Bvh, trace_ray
 
 try:
@@ -42,9 +42,20 @@ class EmbreeRays:
         starts = np.ascontiguousarray(origins, dtype=np.float32)
         aims = np.ascontiguousarray(directions, dtype=np.float32)
         hits = self._scene.run(starts, aims, query="INTERSECT", output=True)
-        missed = hits["primID"] < 0
-        facing_away = np.einsum("ij,ij->i", hits["Ng"], aims) > 0.0
-        return np.where(missed, np.inf, hits["tfar"]), facing_away & ~missed
+        facing_away = np.empty(len(aims), np.bool_)
+        _judge(hits["primID"], hits["Ng"], aims, hits["tfar"], facing_away)
+        return hits["tfar"], facing_away
+
+
+@kernel
+def _judge(triangle, normals, directions, distance, facing_away):
+    """Of hits as Embree gives them: set the `distance` of a miss, and say which surfaces face away."""
+    for i in range(len(triangle)):
+        n, d = normals[i], directions[i]
+        missed = triangle[i] < 0
+        facing_away[i] = not missed and n[0] * d[0] + n[1] * d[1] + n[2] * d[2] > 0.0
+        if missed:
+            distance[i] = np.inf
 
 
 class TreeRays:
@@ -71,7 +82,7 @@ def ray_scene(bvh: Bvh) -> RayScene:
     return EmbreeRays(bvh) if HAS_EMBREE else TreeRays(bvh)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _trace_all(bvh, origins, directions, distance, facing_away):
     for i in range(len(origins)):
         d = directions[i]

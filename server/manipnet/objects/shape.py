@@ -6,13 +6,14 @@ import zipfile
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from platformdirs import user_cache_dir
 from trimesh.triangles import mass_properties
 
 from manipnet.geometry import Array
-from manipnet.kernels import njit
+from manipnet.kernels import kernel
 from manipnet.objects.bvh import Bvh, build_bvh
 from manipnet.objects.field import EXACT_WITHIN_CELLS, RESOLUTION, Field, build_field, signed_distance
 from manipnet.objects.mesh import ClosedMesh, load_mesh
@@ -22,6 +23,16 @@ _CACHE_VERSION = f"1-{RESOLUTION}"
 PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
 """Shapes of the demo's objects, so that a first start need not compile what builds them."""
 _log = logging.getLogger(__name__)
+
+
+class Solid(NamedTuple):
+    """What kernels know of a shape."""
+
+    bvh: Bvh
+    field: Field
+    exact_within_m: float
+    """Distance in the object's own metres below which the sensors refine the field exactly."""
+    center_of_mass: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +68,19 @@ class Shape:
         """No part of it is farther than this from the origin of its frame, metres at scale 1."""
         return float(np.linalg.norm(np.abs(self.bounds).max(axis=0)))
 
-    @property
-    def exact_within_m(self) -> float:
-        """Distance in the object's own metres below which the sensors refine the field exactly."""
-        return EXACT_WITHIN_CELLS * self.field.cell_m
+    @cached_property
+    def solid(self) -> Solid:
+        """What kernels know of it."""
+        return Solid(self.bvh, self.field, EXACT_WITHIN_CELLS * self.field.cell_m, self.center_of_mass)
 
     @cached_property
     def rays(self) -> RayScene:
         """Ray scene, made on first use."""
         return ray_scene(self.bvh)
+
+    def distance(self, p_object: tuple[float, float, float]) -> float:
+        """Exact signed distance of one point in the object's frame."""
+        return _distance(self.solid, *p_object)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
         """Exact distances of `points (N, 3)` in the object's frame: signed `(N,)`, negative inside; unit directions
@@ -80,7 +95,12 @@ class Shape:
         return self.rays.trace(origins, directions)[0]
 
 
-@njit(cache=True, nogil=True)
+@kernel
+def _distance(solid, x, y, z):
+    return signed_distance(solid.bvh, solid.field, x, y, z, np.inf)[0]
+
+
+@kernel
 def _signed_distances(bvh, field, points, exact_within_m, distance, normal):
     for i in range(len(points)):
         d, x, y, z = signed_distance(bvh, field, points[i, 0], points[i, 1], points[i, 2], exact_within_m)

@@ -6,13 +6,11 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array, mirror_points, mirror_poses, transform
-from manipnet.ik.targets import place_targets
+from manipnet.ik.senses import present_senses
 from manipnet.objects.mesh import ClosedMesh
 from manipnet.objects.shape import Shape, build_shape
-from manipnet.page.frames import Frame, HandView, ShapeView
-from manipnet.sensing.ambient import CELL_M, CELLS, CENTER_M, sense_ambient
-from manipnet.sensing.proximity import SENSOR_COUNT, SENSORS, aim_rays, place_sensors, proximity
-from manipnet.sensing.scene import object_from_wrist
+from manipnet.page.frames import Frame, ShapeView
+from manipnet.sensing.ambient import CELL_M, CELLS, CENTER_M
 from manipnet.streams.wire import Side
 
 _STEPS: Final = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
@@ -47,9 +45,17 @@ class Senser:
         mirrored = side == "left"
         if mirrored:
             wrist, obj = mirror_poses(wrist), mirror_poses(obj)
-        rotation, translation = np.empty((3, 3)), np.empty(3)
-        object_from_wrist(wrist, obj, mirrored, rotation, translation)
-        local = self._in_wrist(hand, self._shape(view), rotation, translation, prop_scale / size)
+        local = present_senses(
+            self._shape(view),
+            wrist,
+            obj,
+            mirrored,
+            prop_scale / size,
+            hand.positions,
+            hand.rotations,
+            hand.raw_positions,
+            hand.distances,
+        )
 
         def world(points: Array) -> Array:
             real = mirror_points(points) if mirrored else points
@@ -57,35 +63,14 @@ class Senser:
 
         origin = world(np.zeros((1, 3)))
         return Senses(
-            world(local.cells),
+            world(CELL_CENTERS),
             local.ambient,
             world(local.points),
             (world(local.normals) - origin) / size,
             local.readings * size,
-            world(local.raw),
+            world(hand.raw_positions),
             world(local.targets),
         )
-
-    def _in_wrist(self, hand: HandView, shape: Shape, rotation: Array, translation: Array, scale: float) -> Senses:
-        ambient, targets = np.empty(len(CELL_CENTERS), np.float32), np.empty((22, 3))
-        points, normals = np.empty((SENSOR_COUNT, 3)), np.empty((SENSOR_COUNT, 3))
-        origins, directions = (np.empty((SENSOR_COUNT, 3), np.float32) for _ in range(2))
-        sense_ambient(shape.field, rotation, translation, scale, ambient)
-        place_sensors(SENSORS, hand.positions, hand.rotations, points, normals)
-        aim_rays(rotation, translation, scale, points, normals, origins, directions)
-        readings = proximity(shape.rays, origins, directions, np.full(SENSOR_COUNT, scale))
-        place_targets(
-            shape.bvh,
-            shape.field,
-            rotation,
-            translation,
-            scale,
-            shape.exact_within_m,
-            hand.raw_positions,
-            hand.distances,
-            targets,
-        )
-        return Senses(CELL_CENTERS, ambient, points, normals, readings, hand.raw_positions, targets)
 
     def _shape(self, view: ShapeView) -> Shape:
         if view.content_hash not in self._shapes:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from manipnet.hand.skeleton import JOINT_NAMES, OFFSETS_M
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 from manipnet.objects.field import field_distance
 from manipnet.sensing.scene import map_direction_back, map_point
 
@@ -16,7 +16,7 @@ _FIRST = CENTER_M - 0.5 * (CELLS - 1) * CELL_M
 _HALF_DIAGONAL_M = 0.5 * np.sqrt(3.0) * CELL_M
 
 
-@njit(cache=True, nogil=True)
+@inner
 def occupancy(distance, ox, oy, oz):
     """Occupancy of a cell from its centre's signed distance and the offset to the closest surface point, metres.
 
@@ -29,7 +29,7 @@ def occupancy(distance, ox, oy, oz):
     return 1.0 - distance / CELL_M
 
 
-@njit(cache=True, nogil=True)
+@inner
 def sense_ambient(field, rotation, translation, scale, out):
     """Occupancies into `out (1000,)`, x slowest. Blocks of eight cells far outside or deep inside go at once."""
     out[:] = 0.0

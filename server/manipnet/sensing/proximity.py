@@ -6,11 +6,13 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
-from manipnet.kernels import njit
+from manipnet.kernels import inner, kernel
 from manipnet.objects.rays import RayScene
 from manipnet.sensing.scene import SENSOR_RANGE_M
 
 SENSOR_COUNT = len(SENSOR_BONES)
+_ROUNDING_M = 1e-5
+"""Rays are traced in single precision: one that passes a box this near may touch what fills it."""
 
 
 class Sensors(NamedTuple):
@@ -26,7 +28,23 @@ class Sensors(NamedTuple):
 SENSORS = Sensors(SENSOR_BONES, SENSOR_WEIGHTS, SENSOR_POINTS, SENSOR_NORMALS)
 
 
-@njit(cache=True, nogil=True)
+class Rays(NamedTuple):
+    """Room for rays in the coordinates of the object they are traced against, at most `N` of them."""
+
+    origins: np.ndarray
+    """`(N, 3)` float32."""
+    directions: np.ndarray
+    """`(N, 3)` float32, unit."""
+    places: np.ndarray
+    """`(N, 2)` int32: row and column of each ray's reading among the features."""
+
+
+def room_for_rays(count: int) -> Rays:
+    """Room for `count` rays."""
+    return Rays(np.empty((count, 3), np.float32), np.empty((count, 3), np.float32), np.empty((count, 2), np.int32))
+
+
+@inner
 def place_sensors(sensors, positions, rotations, points, normals):
     """Skin the sensors to a pose: `positions (22, 3)`, `rotations (17, 3, 3)` into `points`, `normals (104, 3)`."""
     for s in range(SENSOR_COUNT):
@@ -48,28 +66,72 @@ def place_sensors(sensors, positions, rotations, points, normals):
             normals[s, i] /= length
 
 
-@njit(cache=True, nogil=True)
-def aim_rays(rotation, translation, scale, points, normals, origins, directions):
-    """Carry the sensors into the object's coordinates as float32 rays `(104, 3)`."""
+@inner
+def aim_rays(box, rotation, translation, scale, points, normals, row, readings, first_column, rays, count):
+    """Carry the sensors of one instant into the object's coordinates, as rays from number `count` on; returns the new
+    count.
+
+    A ray that cannot reach the object's `box (6,)` reads its full range: that is written into `readings` from
+    `first_column` on, and the ray left out. `row` and column are noted with the others.
+    """
+    reach = SENSOR_RANGE_M / scale
     for s in range(SENSOR_COUNT):
+        column = first_column + s
+        readings[column] = SENSOR_RANGE_M
+        enter, leave = 0.0, reach
         for i in range(3):
             p, d = translation[i], 0.0
             for j in range(3):
                 p += rotation[i, j] * points[s, j]
                 d += rotation[i, j] * normals[s, j]
-            origins[s, i], directions[s, i] = p / scale, d
+            p /= scale
+            rays.origins[count, i], rays.directions[count, i] = p, d
+            below, above = box[i] - _ROUNDING_M - p, box[3 + i] + _ROUNDING_M - p
+            if abs(d) < 1e-9:
+                if below > 0.0 or above < 0.0:
+                    leave = -1.0
+            else:
+                near, far = below / d, above / d
+                enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+        if enter <= leave:
+            rays.places[count, 0], rays.places[count, 1] = row, column
+            count += 1
+    return count
 
 
-def proximity(rays: RayScene, origins: np.ndarray, directions: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """Readings `(N,)` in metres of rays `(N, 3)` in object coordinates, at `scale` `(N,)` of the object.
+def read_rays(scene: RayScene, rays: Rays, count: int, scale: Array, rows: np.ndarray) -> None:
+    """Trace the first `count` rays and put their readings, metres, into the features `rows (N, 2356)`.
 
-    Positive outside, at most +10 cm. A first hit on a surface that faces away means the sensor is inside: the ray is
-    reversed and the reading negative, at least -10 cm.
+    `scale (N,)` is the object's. Positive outside, at most +10 cm. A first hit on a surface that faces away means the
+    sensor is inside: the ray is reversed and the reading negative, at least -10 cm.
     """
-    distance, inside = rays.trace(origins, directions)
-    reading = np.minimum(distance * scale, SENSOR_RANGE_M)
-    buried = np.flatnonzero(inside)
-    if len(buried):
-        depth, _ = rays.trace(origins[buried], -directions[buried])
-        reading[buried] = -np.minimum(depth * scale[buried], SENSOR_RANGE_M)
-    return reading
+    if count == 0:
+        return
+    distance, inside = scene.trace(rays.origins[:count], rays.directions[:count])
+    buried = _put_readings(distance, inside, rays, scale, rows)
+    if buried:
+        depth, _ = scene.trace(rays.origins[:buried], rays.directions[:buried])
+        _put_depths(depth, rays, scale, rows)
+
+
+@kernel
+def _put_readings(distance, inside, rays, scale, rows):
+    """Write what rays read, turn those around that began inside, and return how many these are."""
+    buried = 0
+    for k in range(len(distance)):
+        row, column = rays.places[k, 0], rays.places[k, 1]
+        rows[row, column] = min(distance[k] * scale[row], SENSOR_RANGE_M)
+        if inside[k]:
+            for i in range(3):
+                rays.origins[buried, i] = rays.origins[k, i]
+                rays.directions[buried, i] = -rays.directions[k, i]
+            rays.places[buried, 0], rays.places[buried, 1] = row, column
+            buried += 1
+    return buried
+
+
+@kernel
+def _put_depths(depth, rays, scale, rows):
+    for k in range(len(depth)):
+        row, column = rays.places[k, 0], rays.places[k, 1]
+        rows[row, column] = -min(depth[k] * scale[row], SENSOR_RANGE_M)

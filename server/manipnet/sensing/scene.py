@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from manipnet.kernels import njit
+from manipnet.kernels import inner
 
 SENSOR_RANGE_M = 0.10
 """Where proximity and signed distances saturate (paper, section 5.2)."""
 
 
-@njit(cache=True, nogil=True)
+@inner
 def quat_to_matrix_into(q, out):
     """Rotation matrix of the unit quaternion `q (4,)` xyzw, into `out (3, 3)`."""
     x, y, z, w = q[0], q[1], q[2], q[3]
@@ -17,7 +17,7 @@ def quat_to_matrix_into(q, out):
     out[2, 0], out[2, 1], out[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def object_from_wrist(wrist, obj, mirrored, rotation, translation):
     """From wrist coordinates to the object's own metres: `x_object = (rotation · x_wrist + translation) / scale`.
 
@@ -36,7 +36,7 @@ def object_from_wrist(wrist, obj, mirrored, rotation, translation):
             rotation[i, j] = flip * (o[0, i] * w[0, j] + o[1, i] * w[1, j] + o[2, i] * w[2, j])
 
 
-@njit(cache=True, nogil=True)
+@inner
 def map_point(rotation, translation, scale, x, y, z):
     """A point in wrist coordinates to the object's own coordinates."""
     return (
@@ -46,7 +46,7 @@ def map_point(rotation, translation, scale, x, y, z):
     )
 
 
-@njit(cache=True, nogil=True)
+@inner
 def map_direction_back(rotation, x, y, z):
     """A direction in the object's coordinates to wrist coordinates."""
     return (

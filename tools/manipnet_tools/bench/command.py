@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from manipnet.network.bundle import DEFAULT_MODEL, load_bundle
+from manipnet.network.bundle import DEFAULT_MODEL, PROVIDERS, load_bundle
 from manipnet_tools.bench.machine import this_machine
 from manipnet_tools.bench.models import full_width
 from manipnet_tools.bench.performances import Performance, demo, take
 from manipnet_tools.bench.reference import forward_pass
 from manipnet_tools.bench.report import lines, with_ratios
-from manipnet_tools.bench.sections import SECTIONS, Bench, Figures
+from manipnet_tools.bench.sections import SECTIONS, USUAL, Bench, Figures
 from manipnet_tools.takes import TakeError
 
 
@@ -21,12 +21,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Measure, print, write; 0 whether targets are met or not: it is a measurement, not a test."""
     arguments = build_parser().parse_args(argv)
     machine = this_machine()
-    bundle = load_bundle(arguments.model)
+    bundle = load_bundle(arguments.model, arguments.provider)
     full = full_width(bundle)
     performance = _performance(arguments.take, arguments.mesh)
-    bench = Bench(bundle, performance, full, forward_pass(full.content), arguments.seconds)
+    beside = tuple(load_bundle(model, arguments.provider) for model in arguments.beside)
+    bench = Bench(bundle, performance, full, forward_pass(full.content), arguments.seconds, beside)
     figures: Figures = {}
-    for name in arguments.only or SECTIONS:
+    for name in arguments.only or USUAL:
         print(f"… {name}", file=sys.stderr, flush=True)
         figures[name] = SECTIONS[name](bench)
     figures = with_ratios(figures)
@@ -46,11 +47,17 @@ def build_parser() -> argparse.ArgumentParser:
         "--mesh", action="append", default=[], metavar="NAME=FILE", help="mesh of the take's object NAME; repeatable"
     )
     parser.add_argument("--model", default=DEFAULT_MODEL, help="a shipped model, or the folder of one (%(default)s)")
+    parser.add_argument(
+        "--beside", action="append", default=[], metavar="MODEL", help="time ticks of this model too; repeatable"
+    )
+    parser.add_argument("--provider", choices=PROVIDERS, default="cpu", help="what models run on (%(default)s)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all figures here too")
     parser.add_argument(
         "--seconds", type=float, default=100.0, help="of timing in all; building and starting come on top (%(default)s)"
     )
-    parser.add_argument("--only", action="append", choices=SECTIONS, help="measure this section alone; repeatable")
+    parser.add_argument(
+        "--only", action="append", choices=SECTIONS, help="measure this section alone; repeatable; `minutes` takes ten"
+    )
     return parser
 
 

@@ -14,13 +14,14 @@ from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
 
+import msgpack
 import numpy as np
 import trimesh
 import zmq
 
 from manipnet.streams.bodies import BodyFrame
 from manipnet.streams.player import ZmqBodySender, play
-from manipnet.streams.wire import TOPIC_MSGPACK, HandsMessage, decode_msgpack
+from manipnet.streams.wire import TOPIC_MSGPACK
 from manipnet_tools.bench.machine import resident_mb
 from manipnet_tools.bench.performances import Performance, endless
 from manipnet_tools.bench.shapes import gourd
@@ -137,26 +138,39 @@ def end_to_end(model: str, performance: Performance, look_ahead_s: float, second
     with serving(model, performance.meshes, look_ahead_s) as server:
         received, sent = _perform(server, performance, SETTLE_S + seconds + look_ahead_s)
         size = resident_mb(server.process.pid)
-    messages = [(decode_msgpack(payload), at_s) for payload, at_s in received]
-    counted = [(m, at_s) for m, at_s in messages if m.t_capture >= SETTLE_S]
+    counted = [hands for hands in received if hands.t_capture_s >= SETTLE_S]
     if len(counted) < 2:
-        raise ServeError(f"only {len(messages)} hands messages came in {seconds:g} s")
-    sequence = [message.seq for message, _ in counted]
+        raise ServeError(f"only {len(received)} hands messages came in {seconds:g} s")
     return EndToEnd(
         look_ahead_s,
         _latencies(counted, sent, look_ahead_s),
-        np.diff([message.t_publish for message, _ in counted]),
-        sequence[-1] - sequence[0] + 1 - len(sequence),
+        np.diff([hands.t_publish_s for hands in counted]),
+        counted[-1].seq - counted[0].seq + 1 - len(counted),
         size,
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Received:
+    """What is kept of a hands message, and when it came."""
+
+    seq: int
+    t_capture_s: float
+    t_publish_s: float
+    at_s: float
+
+
+def _read(payload: bytes, at_s: float) -> Received:
+    message = msgpack.unpackb(payload)
+    return Received(message["seq"], message["t_capture"], message["t_publish"], at_s)
+
+
 def _perform(
     server: Served, performance: Performance, seconds: float
-) -> tuple[list[tuple[bytes, float]], list[tuple[float, float]]]:
+) -> tuple[list[Received], list[tuple[float, float]]]:
     host, _, port = server.addresses["bodies"].removeprefix("tcp://").rpartition(":")
     frames = takewhile(lambda frame: frame.t_s <= seconds, endless(performance))
-    received: list[tuple[bytes, float]] = []
+    received: list[Received] = []
     with zmq.Context() as context, context.socket(zmq.SUB) as hands:
         hands.setsockopt(zmq.RCVHWM, 0)
         hands.setsockopt(zmq.RCVTIMEO, int(1e3 * (QUIET_S + SETTLE_S)))
@@ -169,7 +183,7 @@ def _perform(
             # hands go on when bodies stop, held: the last frame ends the performance
             while thread.is_alive():
                 with suppress(zmq.Again):
-                    received.append((hands.recv()[len(TOPIC_MSGPACK) :], time.monotonic()))
+                    received.append(_read(hands.recv()[len(TOPIC_MSGPACK) :], time.monotonic()))
         finally:
             thread.join()
             sender.close()
@@ -180,16 +194,14 @@ def _play(frames: Iterable[BodyFrame], sender: TimedSender) -> None:
     play(frames, sender)
 
 
-def _latencies(
-    messages: Iterable[tuple[HandsMessage, float]], sent: list[tuple[float, float]], look_ahead_s: float
-) -> np.ndarray:
+def _latencies(messages: Iterable[Received], sent: list[tuple[float, float]], look_ahead_s: float) -> np.ndarray:
     """From the first frame at or after what a tick looks ahead to, to its message; frames are at rising times."""
     times_s, handed_s = np.array(sent).T
     latencies = []
-    for message, at_s in messages:
-        needed = int(np.searchsorted(times_s, message.t_capture + look_ahead_s - TOLERANCE_S))
+    for hands in messages:
+        needed = int(np.searchsorted(times_s, hands.t_capture_s + look_ahead_s - TOLERANCE_S))
         if needed < len(times_s):
-            latencies.append(at_s - handed_s[needed])
+            latencies.append(hands.at_s - handed_s[needed])
     return np.array(latencies)
 
 

@@ -13,31 +13,34 @@ FULL = "manipnet-full"
 
 @dataclass(frozen=True)
 class FullWidth:
-    """The paper's width in single precision: its graph, a bundle of it, and where its weights are from."""
+    """The paper's width in single precision with random weights: its graph, and a bundle of it."""
 
     content: bytes
     bundle: Bundle
-    origin: str
 
 
 def full_width(small: Bundle) -> FullWidth:
-    """The shipped full-width bundle if there is one, else random weights in the company of the `small` one's pose.
+    """Random weights in the company of the `small` bundle's pose; a tick costs what it would with trained ones.
 
     Raises `ModuleNotFoundError` without the onnx to make a graph.
     """
+    graph = full_graph(small.rest_angles)
+    return FullWidth(graph, replace(small, name="full width", session=open_session("full width", graph)))
+
+
+def shipped_full_width() -> Bundle | None:
+    """The full-width bundle of this installation, if it has one."""
     try:
-        shipped = load_bundle(FULL)
+        return load_bundle(FULL)
     except BundleError:
-        graph = full_graph(small.rest_angles)
-        return FullWidth(graph, replace(small, name="full width", session=open_session("full width", graph)), "random")
-    return FullWidth((shipped.folder / "manipnet.onnx").read_bytes(), shipped, "shipped")
+        return None
 
 
 def quantised(full: FullWidth) -> Bundle:
     """The same with 8-bit weights. Raises `ModuleNotFoundError` without onnx."""
-    from manipnet_tools.compress import quantise_weights, single_precision
+    from manipnet_tools.compress import quantise_weights
 
-    session = open_session("8 bits", quantise_weights(single_precision(full.content)))
+    session = open_session("8 bits", quantise_weights(full.content))
     return replace(full.bundle, name="full width, 8 bits", session=session)
 
 

@@ -40,6 +40,8 @@ TARGETS = (
     Target("hands missing", ("live", "0.5", "missing"), 0.0, ""),
     Target("ready, warm cache", ("start", "warm_s"), 3.0, "s"),
     Target("ready, empty cache", ("start", "cold_s"), 12.0, "s"),
+    Target("ten minutes, published interval: p99", ("minutes", "interval", "p99_ms"), 18.5, "ms"),
+    Target("ten minutes, hands missing", ("minutes", "missing"), 0.0, ""),
     Target("resident memory, one actor", ("live", "0.5", "resident_mb"), 350.0, "MB"),
 )
 
@@ -121,7 +123,8 @@ def _totals(title: str, section: Figures) -> Iterator[str]:
                 f"{total['p50']:9.3f} {total['p99']:9.3f}   {stages}"
             )
     if "weights" in section:
-        yield f"weights: {section['weights']}; joints of 8 bits at most {section['8_bits_apart_mm']:.2f} mm apart"
+        apart_mm = section["8_bits_apart_mm"]
+        yield f"8 bits: {section['weights']} weights; random ones put joints at most {apart_mm:.2f} mm apart"
 
 
 def _straightforward(section: Figures) -> Iterator[str]:
@@ -138,11 +141,14 @@ def _process(figures: Figures) -> Iterator[str]:
         for name, cache in (("cold", "an empty"), ("warm", "a full")):
             size = start[f"{name}_mb"]
             yield f"ready after {start[f'{name}_s']:.1f} s with {cache} cache" + (f", {size:.0f} MB" if size else "")
-    for look_ahead, row in figures.get("live", {}).items():
+    served = {f"look-ahead {look_ahead} s": row for look_ahead, row in figures.get("live", {}).items()}
+    if "minutes" in figures:
+        served["ten minutes"] = figures["minutes"]
+    for what, row in served.items():
         latency, interval = row["latency"], row["interval"]
         size = f", {row['resident_mb']:.0f} MB resident" if row["resident_mb"] else ""
         yield (
-            f"look-ahead {look_ahead} s, {row['hands']} hands over sockets: last packet needed to hands received p50 "
+            f"{what}, {row['hands']} hands over sockets: last packet needed to hands received p50 "
             f"{latency['p50_ms']:.2f}, p99 {latency['p99_ms']:.2f}, max {latency['max_ms']:.2f} ms; interval p50 "
             f"{interval['p50_ms']:.2f}, p99 {interval['p99_ms']:.2f}, max {interval['max_ms']:.2f} ms; "
             f"{row['missing']} missing{size}"

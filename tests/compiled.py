@@ -1,0 +1,9 @@
+"""A way for tests into functions that only kernels call."""
+
+from numba import njit
+
+
+@njit
+def call(function, *arguments):
+    """The result of a compiled `function`."""
+    return function(*arguments)
