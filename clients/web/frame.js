@@ -81,14 +81,16 @@ export class HandsFrame {
 export function decode(buffer, frame) {
   if (buffer.byteLength < L.HEADER_BYTES) throw new Error("not a pose/bin message: it is shorter than a header");
   const view = new DataView(buffer);
-  const u16 = (offset) => view.getUint16(offset, true);
   if (view.getUint32(0, true) !== L.MAGIC) throw new Error("not a pose/bin message: it must start with MNPL");
-  const version = u16(L.HEADER_VERSION);
+  const version = view.getUint16(L.HEADER_VERSION, true);
   if (version !== L.VERSION) {
     throw new Error(`message is of version ${version}; this reader understands version ${L.VERSION}`);
   }
-  const [headerSize, handSize, bodySize] = [L.HEADER_HEADER_SIZE, L.HEADER_HAND_SIZE, L.HEADER_BODY_SIZE].map(u16);
-  const [hands, bodies] = [L.HEADER_HAND_COUNT, L.HEADER_BODY_COUNT].map(u16);
+  const headerSize = view.getUint16(L.HEADER_HEADER_SIZE, true);
+  const handSize = view.getUint16(L.HEADER_HAND_SIZE, true);
+  const bodySize = view.getUint16(L.HEADER_BODY_SIZE, true);
+  const hands = view.getUint16(L.HEADER_HAND_COUNT, true);
+  const bodies = view.getUint16(L.HEADER_BODY_COUNT, true);
   if (headerSize < L.HEADER_BYTES || handSize < L.HAND_BYTES || bodySize < L.BODY_BYTES) {
     throw new Error("a record is shorter than its fields");
   }

@@ -62,14 +62,14 @@ export class ManipNetClient {
     return this.#interpolator.sample(nowS);
   }
 
-  /** Counters and rates: state, received, late, lost, refused, connections, rateHz, ageS. */
+  /** Counters and rates: state, received, late, lost, refused, connections, seq (of the newest), rateHz, ageS. */
   stats() {
     const now = performance.now() / 1000;
     const known = this.#arrivals.subarray(0, Math.min(this.#counts.received, RATE_HZ));
     const recent = known.filter((t) => now - t <= 1);
     const span = recent.length > 1 ? Math.max(...recent) - Math.min(...recent) : 0;
     const rateHz = span > 0 ? (recent.length - 1) / span : 0;
-    return { ...this.#counts, late: this.#interpolator.late, rateHz, ageS: now - this.#newestAt };
+    return { ...this.#counts, late: this.#interpolator.late, seq: this.#seq, rateHz, ageS: now - this.#newestAt };
   }
 
   close() {
@@ -81,6 +81,7 @@ export class ManipNetClient {
   }
 
   #connect() {
+    this.#heardMs = performance.now();
     const socket = new WebSocket(this.#address);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
@@ -103,11 +104,10 @@ export class ManipNetClient {
     this.#waitMs = Math.min(2 * this.#waitMs, BACK_OFF_LIMIT_MS);
   }
 
-  /** A server that vanished without a word leaves the socket open for minutes. */
+  /** A server that vanished without a word leaves the socket open for minutes; one that never answers, opening. */
   #checkAlive() {
-    const open = this.#socket?.readyState === WebSocket.OPEN;
-    if (!open || performance.now() - this.#heardMs < DEAD_AFTER_MS) return;
     const socket = this.#socket;
+    if (socket === null || performance.now() - this.#heardMs < DEAD_AFTER_MS) return;
     this.#retry(socket);
     socket.close();
   }

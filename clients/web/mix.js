@@ -64,7 +64,10 @@ function numbers(output, first, stride, width) {
 /** `output` still holds the reference, whose half of the sphere the others are brought to. */
 function quaternions(output, first, stride) {
   for (let i = first; i < output.length; i += stride) {
-    let [x, y, z, w] = [0, 0, 0, 0];
+    let x = 0;
+    let y = 0;
+    let z = 0;
+    let w = 0;
     for (let k = 0; k < parts.length; k++) {
       const q = sources[k];
       const dot =

@@ -1,10 +1,13 @@
 """The engine-free clients of other languages, each as a command that speaks the harness's text protocol."""
 
 import json
+import os
 import subprocess
+import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from support import CLIENTS, ROOT, need
 
@@ -13,12 +16,25 @@ CSHARP = CLIENTS / "unity" / "com.manipnet.client" / "Runtime" / "Core"
 CPP = CLIENTS / "unreal" / "ManipNetLiveLink" / "Source" / "ManipNetLiveLink" / "Private" / "Core"
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror")
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-NAMES = ("csharp", "gcc-sanitized", "clang", "javascript")
+NAMES = ("csharp", "gcc-sanitized", "gcc-threads", "clang", "javascript", "python")
+"""The C++ is built thrice: with gcc and its address and undefined-behaviour sanitizers, with gcc and its thread
+sanitizer, and optimised with clang."""
+
+SMALL_NURSERY = {"MONO_GC_PARAMS": "nursery-size=64k"}
+"""Mono then collects after 64 kB: no collection in n frames means less than 64 kB / n for each."""
 
 
 def build(name: str, folder: Path) -> list[str]:
     """The command that runs a client's harness; skips the test where its tools are missing."""
-    return {"csharp": _csharp, "gcc-sanitized": _gcc, "clang": _clang, "javascript": _javascript}[name](folder)
+    builders = {
+        "csharp": _csharp,
+        "gcc-sanitized": lambda folder: _gcc(folder, *SANITIZERS),
+        "gcc-threads": lambda folder: _gcc(folder, "-fsanitize=thread"),
+        "clang": _clang,
+        "javascript": _javascript,
+        "python": lambda _: [sys.executable, str(HARNESSES / "python_harness.py")],
+    }
+    return builders[name](folder)
 
 
 def _csharp(folder: Path) -> list[str]:
@@ -30,8 +46,8 @@ def _csharp(folder: Path) -> list[str]:
     return [mono, str(exe)]
 
 
-def _gcc(folder: Path) -> list[str]:
-    return _cpp(need("g++")[0], folder / "gcc", "-g", *SANITIZERS)
+def _gcc(folder: Path, *sanitizers: str) -> list[str]:
+    return _cpp(need("g++")[0], folder / "gcc", "-g", *sanitizers)
 
 
 def _clang(folder: Path) -> list[str]:
@@ -48,7 +64,8 @@ def _cpp(compiler: str, exe: Path, *options: str) -> list[str]:
 def _javascript(_: Path) -> list[str]:
     (node,) = need("node")
     # Before version 22 node's own WebSocket has to be asked for.
-    return [node, "--no-warnings", "--experimental-websocket", str(HARNESSES / "web" / "harness.mjs")]
+    options = ["--no-warnings", "--experimental-websocket", "--expose-gc", "--max-semi-space-size=64"]
+    return [node, *options, str(HARNESSES / "web" / "harness.mjs")]
 
 
 def run(command: list[str], *words: str, text: str = "") -> list[str]:
@@ -65,16 +82,17 @@ class LiveClient:
     process: subprocess.Popen
 
     @classmethod
-    def start(cls, command: list[str], address: str) -> "LiveClient":
-        """Run the harness's `live`."""
-        pipe = subprocess.PIPE
-        return cls(subprocess.Popen([*command, "live", address], stdin=pipe, stdout=pipe, encoding="utf-8"))
+    def start(cls, command: list[str], address: str, verb: str = "live") -> "LiveClient":
+        """Run the harness's `live` or `idle`."""
+        pipe, environment = subprocess.PIPE, {**os.environ, **SMALL_NURSERY}
+        words = [*command, verb, address]
+        return cls(subprocess.Popen(words, stdin=pipe, stdout=pipe, encoding="utf-8", env=environment))
 
-    def ask(self) -> dict:
-        """The client's figures as of now."""
+    def ask(self, what: str = "") -> Any:
+        """The client's figures as of now, or its "arrivals": number and time of every frame since they were told."""
         assert self.process.stdin is not None
         assert self.process.stdout is not None
-        self.process.stdin.write("\n")
+        self.process.stdin.write(f"{what}\n")
         self.process.stdin.flush()
         return json.loads(self.process.stdout.readline())
 

@@ -3,14 +3,12 @@
 import http.server
 import socket
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import pytest
 import zmq
 from languages import LiveClient
-from manipnet_client import Client
 from publisher import message
 from support import VECTORS
 
@@ -20,38 +18,13 @@ ZMTP_CLIENTS = ("python", "csharp", "gcc-sanitized")
 BAD = [TOPIC_BIN + path.read_bytes() for path in sorted(VECTORS.glob("bad_*.bin")) if path.stat().st_size]
 
 
-class PythonClient:
-    """The Python client behind the harnesses' questions."""
-
-    def __init__(self, address: str) -> None:
-        self._client = Client(address)
-
-    def ask_until(self, condition) -> dict:
-        give_up = time.monotonic() + 30
-        while True:
-            stats = self._client.stats()
-            figures = {"state": stats.state, "received": stats.received, "refused": stats.refused}
-            if condition(figures):
-                return figures
-            assert time.monotonic() < give_up, figures
-            time.sleep(0.01)
-
-    def close(self) -> tuple[str, int]:
-        self._client.close()
-        return self._client.stats().state, 0
-
-    def kill(self) -> None:
-        self._client.close()
-
-
 @pytest.fixture(params=ZMTP_CLIENTS)
 def connecting(request, harness):
     """Starts a client of each kind at an address, and ends it."""
     started = []
 
     def start(address):
-        kind = request.param
-        started.append(PythonClient(address) if kind == "python" else LiveClient.start(harness(kind), address))
+        started.append(LiveClient.start(harness(request.param), address))
         return started[-1]
 
     yield start

@@ -1,6 +1,7 @@
-// Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS`. Talks in text lines.
-#include <algorithm>
+// Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS` and others. Talks
+// in text lines.
 #include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -11,6 +12,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "Axes.h"
@@ -155,48 +157,98 @@ void Connections() {
     }
 }
 
-/// Show at 90 Hz until standard input ends; a line of figures for every line read.
+/// What a program does that shows hands, and notes of it. Allocates nothing but for answers.
+class Show {
+public:
+    explicit Show(Client& client) : From(client), Noted(1 << 16) {}
+
+    void Step() {
+        const Stats stats = From.GetStats();
+        const double now = LocalNow();
+        if (stats.Received > 0 && stats.Seq != Seq && Count < Noted.size()) {
+            Seq = stats.Seq;
+            Noted[Count++] = {Seq, now - stats.AgeS};
+        }
+        if (now < Due) return;
+        Due = now + 1.0 / 90.0;
+        if (From.Sample(now, Shown, Weight)) ++Shows;
+    }
+
+    std::string Arrivals() {
+        std::string text = "[";
+        for (std::size_t i = 0; i < Count; ++i)
+            text += (i > 0 ? ",[" : "[") + std::to_string(Noted[i].first) + "," + Number(Noted[i].second) + "]";
+        Count = 0;
+        return text + "]";
+    }
+
+    std::string Figures() const {
+        const Stats s = From.GetStats();
+        std::ostringstream out;
+        out << "{\"state\":" << Quote(s.State) << ",\"received\":" << s.Received << ",\"lost\":" << s.Lost << ",\"late\":" << s.Late
+            << ",\"refused\":" << s.Refused << ",\"connections\":" << s.Connections << ",\"seq\":" << s.Seq
+            << ",\"rate_hz\":" << Number(s.RateHz) << ",\"age_s\":" << (s.AgeS < 0 ? "null" : Number(s.AgeS))
+            << ",\"transit_s\":" << Number(s.TransitS) << ",\"weight\":" << Number(static_cast<double>(Weight))
+            << ",\"shown_seq\":" << Shown.Seq << ",\"session\":" << Quote(Shown.Session.Text) << ",\"shows\":" << Shows
+            << ",\"allocations\":" << Allocations << "}";
+        return out.str();
+    }
+
+private:
+    Client& From;
+    HandsFrame Shown;
+    std::vector<std::pair<std::uint64_t, double>> Noted;
+    std::size_t Count = 0;
+    std::uint64_t Seq = 0;
+    double Due = 0.0;
+    float Weight = 0.0F;
+    long Shows = 0;
+};
+
+bool Connect(const std::string& address, Connection& to) {
+    const std::string error = ParseConnection(address + " delay=0.05", to);
+    if (!error.empty()) std::cerr << error << "\n";
+    return error.empty();
+}
+
+/// Show at about 90 Hz until standard input ends. For every line read: figures, or for "arrivals" the number and the
+/// arrival of every frame since the last time.
 int Live(const std::string& address) {
     Connection to;
-    const std::string error = ParseConnection(address + " delay=0.05", to);
-    if (!error.empty()) {
-        std::cerr << error << "\n";
-        return 2;
-    }
-    std::atomic<int> asked{0};
+    if (!Connect(address, to)) return 2;
+    enum { kNothing, kFigures, kArrivals };
+    std::atomic<int> asked{kNothing};
     std::atomic<bool> ended{false};
     std::thread asking([&] {
-        std::string line;
-        while (std::getline(std::cin, line)) ++asked;
+        for (std::string line; std::getline(std::cin, line);) asked = line == "arrivals" ? kArrivals : kFigures;
         ended = true;
     });
     {
         Client client(to);
-        HandsFrame shown;
-        long shows = 0;
-        double slowest = 0.0;
-        for (int answered = 0; !ended;) {
-            float weight = 0.0F;
-            if (client.Sample(LocalNow(), shown, weight)) ++shows;
-            slowest = std::max(slowest, client.GetStats().TransitS);
-            std::this_thread::sleep_for(std::chrono::milliseconds(11));
-            if (answered == asked) continue;
-            ++answered;
-            const long allocations = Allocations;
-            const Stats s = client.GetStats();
-            std::ostringstream out;
-            out << "{\"state\":" << Quote(s.State) << ",\"received\":" << s.Received << ",\"lost\":" << s.Lost
-                << ",\"late\":" << s.Late << ",\"refused\":" << s.Refused << ",\"connections\":" << s.Connections
-                << ",\"rate_hz\":" << Number(s.RateHz) << ",\"age_s\":" << (s.AgeS < 0 ? "null" : Number(s.AgeS))
-                << ",\"shown_seq\":" << shown.Seq << ",\"session\":" << Quote(shown.Session.Text)
-                << ",\"shows\":" << shows << ",\"allocations\":" << allocations
-                << ",\"transit_s\":" << Number(slowest) << "}";
-            slowest = 0.0;
-            std::cout << out.str() << std::endl;
+        Show show(client);
+        while (!ended) {
+            show.Step();
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            const int what = asked.exchange(kNothing);
+            if (what == kNothing) continue;
+            std::cout << (what == kArrivals ? show.Arrivals() : show.Figures()) << std::endl;
             Allocations = 0;  // what answering costs does not count
         }
     }
     asking.join();
+    std::cout << "closed" << std::endl;
+    return 0;
+}
+
+/// Never shows anything and blocks the main thread: figures for every line read.
+int Idle(const std::string& address) {
+    Connection to;
+    if (!Connect(address, to)) return 2;
+    {
+        Client client(to);
+        const Show show(client);
+        for (std::string line; std::getline(std::cin, line);) std::cout << show.Figures() << std::endl;
+    }
     std::cout << "closed" << std::endl;
     return 0;
 }
@@ -225,6 +277,8 @@ int main(int count, char** words) {
         Connections();
     } else if (verb == "live" && count == 3) {
         return Live(words[2]);
+    } else if (verb == "idle" && count == 3) {
+        return Idle(words[2]);
     } else {
         return 2;
     }

@@ -6,7 +6,7 @@ using System.Text;
 using System.Threading;
 using ManipNet.Client;
 
-/// <summary>Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS`, in text lines.</summary>
+/// <summary>Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS` and others, in text lines.</summary>
 static class Harness
 {
     static int Main(string[] args)
@@ -33,6 +33,9 @@ static class Harness
                 return 0;
             case "live":
                 Live(args[1]);
+                return 0;
+            case "idle":
+                Idle(args[1]);
                 return 0;
         }
         return 2;
@@ -166,43 +169,95 @@ static class Harness
         return data;
     }
 
-    /// <summary>Show at 90 Hz until standard input ends; a line of figures for every line read.</summary>
+    /// <summary>
+    /// Show at about 90 Hz until standard input ends. For every line read: figures, or for "arrivals" the number and the
+    /// arrival of every frame since the last time.
+    /// </summary>
     static void Live(string address)
     {
-        var shown = new HandsFrame();
         using (var client = new ManipNetClient(address, null, 0.05))
         {
-            bool ended = false;
-            int asked = 0;
+            var show = new Show { Client = client };
             var asking = new Thread(() =>
             {
-                while (Console.ReadLine() != null) Interlocked.Increment(ref asked);
-                ended = true;
+                string line;
+                while ((line = Console.ReadLine()) != null) Volatile.Write(ref show.Asked, line);
+                Volatile.Write(ref show.Ended, true);
             }) { IsBackground = true };
             asking.Start();
-            int answered = 0, collections = GC.CollectionCount(0);
-            long shows = 0, counted = 0;
-            double slowest = 0.0;
-            while (!Volatile.Read(ref ended))
+            while (!Volatile.Read(ref show.Ended))
             {
-                float weight;
-                if (client.Sample(LocalClock.Now, shown, out weight)) shows++;
-                Stats now = client.GetStats();
-                if (now.Received > counted) slowest = Math.Max(slowest, now.TransitS);
-                counted = now.Received;
-                Thread.Sleep(11);
-                if (answered == Volatile.Read(ref asked)) continue;
-                answered++;
-                Stats stats = client.GetStats();
-                Console.WriteLine("{{\"state\":{0},\"received\":{1},\"lost\":{2},\"late\":{3},\"refused\":{4},\"connections\":{5},\"rate_hz\":{6},\"age_s\":{7},\"shown_seq\":{8},\"session\":{9},\"shows\":{10},\"collections\":{11},\"memory\":{12},\"transit_s\":{13}}}",
-                    Quote(stats.State), stats.Received, stats.Lost, stats.Late, stats.Refused, stats.Connections, Number(stats.RateHz),
-                    double.IsInfinity(stats.AgeS) ? "null" : Number(stats.AgeS), shown.Seq, Quote(shown.Session.Text), shows,
-                    GC.CollectionCount(0) - collections, GC.GetTotalMemory(false), Number(slowest));
-                slowest = 0.0;
+                show.Step();
+                Thread.Sleep(1);
+                string asked = Interlocked.Exchange(ref show.Asked, null);
+                if (asked == null) continue;
+                Console.WriteLine(asked == "arrivals" ? show.Arrivals() : show.Figures());
                 Console.Out.Flush();
+                GC.Collect(); // what answering costs does not count
+                show.Collections = GC.CollectionCount(0);
             }
         }
         Console.WriteLine("closed");
+    }
+
+    /// <summary>Never shows anything and blocks the main thread: figures for every line read.</summary>
+    static void Idle(string address)
+    {
+        using (var client = new ManipNetClient(address, null, 0.05))
+        {
+            var show = new Show { Client = client };
+            while (Console.ReadLine() != null) Console.WriteLine(show.Figures());
+        }
+        Console.WriteLine("closed");
+    }
+
+    /// <summary>What a program does that shows hands, and notes of it. Allocates nothing but for answers.</summary>
+    sealed class Show
+    {
+        public ManipNetClient Client;
+        public string Asked;
+        public bool Ended;
+        public int Collections;
+        readonly HandsFrame _shown = new HandsFrame();
+        readonly double[] _seqs = new double[1 << 16], _times = new double[1 << 16];
+        int _noted, _shows;
+        ulong _seq;
+        double _due;
+        float _weight;
+
+        public void Step()
+        {
+            Stats stats = Client.GetStats();
+            double now = LocalClock.Now;
+            if (stats.Received > 0 && stats.Seq != _seq && _noted < _seqs.Length)
+            {
+                _seq = stats.Seq;
+                _seqs[_noted] = _seq;
+                _times[_noted++] = now - stats.AgeS;
+            }
+            if (now < _due) return;
+            _due = now + 1.0 / 90.0;
+            if (Client.Sample(now, _shown, out _weight)) _shows++;
+        }
+
+        public string Arrivals()
+        {
+            string text = string.Join(",", Enumerable.Range(0, _noted).Select(i => "[" + _seqs[i] + "," + Number(_times[i]) + "]"));
+            _noted = 0;
+            return "[" + text + "]";
+        }
+
+        public string Figures()
+        {
+            Stats stats = Client.GetStats();
+            return "{\"state\":" + Quote(stats.State) + ",\"received\":" + stats.Received + ",\"lost\":" + stats.Lost
+                + ",\"late\":" + stats.Late + ",\"refused\":" + stats.Refused + ",\"connections\":" + stats.Connections
+                + ",\"seq\":" + stats.Seq + ",\"rate_hz\":" + Number(stats.RateHz)
+                + ",\"age_s\":" + (double.IsInfinity(stats.AgeS) ? "null" : Number(stats.AgeS))
+                + ",\"transit_s\":" + Number(stats.TransitS) + ",\"weight\":" + Number(_weight) + ",\"shown_seq\":" + _shown.Seq
+                + ",\"session\":" + Quote(_shown.Session.Text) + ",\"shows\":" + _shows
+                + ",\"collections\":" + (GC.CollectionCount(0) - Collections) + "}";
+        }
     }
 
     static string Floats(float[] values)

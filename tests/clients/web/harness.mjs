@@ -1,7 +1,9 @@
-// Runs the web client for the tests: `decode FILES`, `interpolate`, `live ADDRESS`. Talks in text lines.
+// Runs the web client for the tests: `decode FILES`, `interpolate`, `live ADDRESS`, `garbage FILE`. Talks in
+// text lines.
 import { readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { decode, HandsFrame, Interpolator, ManipNetClient } from "../../../clients/web/manipnet.js";
+import { HEADER_SEQ, HEADER_T_CAPTURE, RATE_HZ } from "../../../clients/web/layout.js";
 
 const [verb, ...words] = process.argv.slice(2);
 const lines = () => createInterface({ input: process.stdin });
@@ -51,21 +53,60 @@ async function interpolate() {
   }
 }
 
+/** Node's performance.now starts with the process; the others' clock is the machine's. */
+const sinceBoot = Number(process.hrtime.bigint()) / 1e9 - performance.now() / 1000;
+
+/** Show at about 90 Hz until standard input ends. For every line: figures, or for "arrivals" those since the last time. */
 async function live(address) {
   const client = new ManipNetClient(address, { delayS: 0.05 });
-  let shows = 0;
+  let [shows, seq, arrivals] = [0, -1, []];
   const showing = setInterval(() => client.sample() && shows++, 11);
-  for await (const _ of lines()) {
+  const noting = setInterval(() => {
+    const stats = client.stats();
+    if (stats.received === 0 || stats.seq === seq) return;
+    seq = stats.seq;
+    arrivals.push([seq, sinceBoot + performance.now() / 1000 - stats.ageS]);
+  }, 1);
+  for await (const line of lines()) {
+    if (line === "arrivals") {
+      console.log(JSON.stringify(arrivals));
+      arrivals = [];
+      continue;
+    }
     const { rateHz, ageS, ...stats } = client.stats();
-    const shown = { shown_seq: client.hands.seq, session: client.hands.session };
+    const shown = { weight: client.weight, shown_seq: client.hands.seq, session: client.hands.session };
     console.log(JSON.stringify({ ...stats, rate_hz: rateHz, age_s: ageS, ...shown, shows }));
   }
   clearInterval(showing);
+  clearInterval(noting);
   client.close();
   console.log("closed");
+}
+
+/** Heap bytes per frame of reading and showing a message again and again, without what the WebSocket itself makes. */
+function garbage(path) {
+  const message = exact(readFileSync(path));
+  const view = new DataView(message);
+  const interpolator = new Interpolator();
+  let spare = new HandsFrame();
+  const frames = (from, to) => {
+    for (let k = from; k < to; k++) {
+      view.setUint32(HEADER_SEQ, k, true);
+      view.setFloat64(HEADER_T_CAPTURE, k / RATE_HZ, true);
+      decode(message, spare);
+      spare = interpolator.push(spare, k / RATE_HZ);
+      interpolator.sample(k / RATE_HZ);
+    }
+  };
+  frames(0, 20_000); // until it is compiled
+  globalThis.gc();
+  const before = process.memoryUsage().heapUsed;
+  frames(20_000, 30_000);
+  console.log((process.memoryUsage().heapUsed - before) / 10_000);
 }
 
 if (verb === "decode") for (const path of words) console.log(JSON.stringify(describe(exact(readFileSync(path)))));
 else if (verb === "interpolate") await interpolate();
 else if (verb === "live") await live(words[0]);
+else if (verb === "garbage") garbage(words[0]);
 else process.exit(2);

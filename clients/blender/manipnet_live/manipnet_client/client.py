@@ -27,8 +27,8 @@ class Stats:
     """What a status line shows.
 
     `received` frames arrived; of these, `late` ones came too late to be shown, and `refused` ones could not be
-    read. `lost` frames never arrived. `age_s`: time since the newest frame. `transit_s`: how long it was on its way,
-    which means something only where server and client share a clock.
+    read. `lost` frames never arrived. `seq`: the newest frame's number. `age_s`: time since it arrived. `transit_s`:
+    how long it was on its way, which means something only where server and client share a clock.
     """
 
     state: str = "connecting"
@@ -37,6 +37,7 @@ class Stats:
     late: int = 0
     refused: int = 0
     connections: int = 0
+    seq: int = 0
     rate_hz: float = 0.0
     age_s: float = float("inf")
     transit_s: float = 0.0
@@ -149,7 +150,7 @@ class Client:
     def _accept(self, hands: Hands, arrival_s: float) -> None:
         stats, (session, seq) = self._stats, self._last
         lost = max(hands.seq - seq - 1, 0) if session == hands.session else 0
-        counted = {"received": stats.received + 1, "lost": stats.lost + lost}
+        counted = {"received": stats.received + 1, "lost": stats.lost + lost, "seq": hands.seq}
         self._stats = replace(stats, state="connected", transit_s=arrival_s - hands.t_publish, **counted)
         self._last = (hands.session, hands.seq)
         self._arrivals.append(arrival_s)

@@ -19,6 +19,9 @@ namespace ManipNet.Client
         /// <summary>Messages that could not be read.</summary>
         public long Refused;
         public int Connections;
+
+        /// <summary>Number of the newest frame, as the server counts them.</summary>
+        public ulong Seq;
         public double RateHz;
 
         /// <summary>Seconds since the newest frame.</summary>
@@ -92,6 +95,7 @@ namespace ManipNet.Client
                 double now = LocalClock.Now;
                 stats.Late = _interpolator.Late;
                 stats.AgeS = now - _newestAt;
+                stats.Seq = _seq;
                 int recent = 0;
                 double earliest = now, latest = 0.0;
                 for (int i = 0; i < Math.Min(_stats.Received, _arrivals.Length); i++)

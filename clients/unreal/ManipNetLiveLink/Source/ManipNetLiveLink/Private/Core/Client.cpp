@@ -39,6 +39,7 @@ Stats Client::GetStats() const {
     Stats stats = Counted;
     const double now = LocalNow();
     stats.Late = Frames.Late;
+    stats.Seq = Seq;
     stats.AgeS = stats.Received > 0 ? now - NewestAt : -1.0;
     const auto known = std::min<std::size_t>(static_cast<std::size_t>(stats.Received), Arrivals.size());
     double earliest = now;

@@ -23,6 +23,7 @@ struct Stats {
     std::int64_t Lost = 0;     ///< Frames that never arrived.
     std::int64_t Refused = 0;  ///< Messages that could not be read.
     int Connections = 0;
+    std::uint64_t Seq = 0;  ///< Number of the newest frame, as the server counts them.
     double RateHz = 0.0;
     double AgeS = -1.0;     ///< Seconds since the newest frame; negative before the first.
     double TransitS = 0.0;  ///< Seconds it was on its way; means something only where server and client share a clock.
