@@ -1,10 +1,12 @@
 """The last check before a pose leaves: finite, inside its limits, no faster than fingers move."""
 
+import math
 from typing import Final
 
 import numpy as np
 
 from manipnet.geometry import Array
+from manipnet.hand.limits import keep_angles
 from manipnet.telemetry import Counters
 
 MAX_SPEED_RAD_S: Final = 40.0
@@ -26,19 +28,18 @@ class OutputGuard:
 
     def check(self, angles: Array | None, wrist: Array | None) -> None:
         """Raise `NotFiniteError` for `angles (20,)` or a `wrist (7,)` that nobody may see."""
-        if angles is not None and not np.isfinite(angles).all():
+        if angles is not None and not math.isfinite(angles.sum()):
             self._refuse("a synthesised angle is not finite")
-        if wrist is not None and not (np.isfinite(wrist).all() and abs(wrist[3:] @ wrist[3:] - 1.0) < 1e-3):
+        if wrist is not None and not (math.isfinite(wrist.sum()) and abs(wrist[3:] @ wrist[3:] - 1.0) < 1e-3):
             self._refuse("a wrist is no pose")
 
     def inside(self, angles: Array) -> Array:
         """`angles (20,)` kept inside their limits."""
-        return self._kept("limit", angles, self._limits[:, 0], self._limits[:, 1])
+        return self._kept(angles, angles, math.inf)
 
     def within(self, angles: Array, last: Array, dt_s: float) -> Array:
         """`angles (20,)` kept inside their limits and in reach of the `last` ones, `dt_s` before."""
-        reach = MAX_SPEED_RAD_S * dt_s
-        return self._kept("speed", self.inside(angles), last - reach, last + reach)
+        return self._kept(angles, last, MAX_SPEED_RAD_S * dt_s)
 
     def is_reachable(self, step_m: float, turn_rad: float, dt_s: float) -> bool:
         """Whether a wrist may go so far within `dt_s`."""
@@ -51,8 +52,11 @@ class OutputGuard:
         self._counters.add("output_guarded", reason="not_finite")
         raise NotFiniteError(what)
 
-    def _kept(self, reason: str, angles: Array, low: Array, high: Array) -> Array:
-        kept = np.clip(angles, low, high)
-        if np.abs(kept - angles).max() > 1e-6:
-            self._counters.add("output_guarded", reason=reason)
+    def _kept(self, angles: Array, last: Array, reach: float) -> Array:
+        kept = np.empty_like(angles)
+        beyond_limits, too_fast = keep_angles(angles, self._limits, last, reach, kept)
+        if beyond_limits:
+            self._counters.add("output_guarded", reason="limit")
+        if too_fast:
+            self._counters.add("output_guarded", reason="speed")
         return kept

@@ -1,7 +1,7 @@
 """What is shown of a hand while its tracking comes and goes: live, hold, rest, and never a jump between them."""
 
 import math
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -121,11 +121,16 @@ class Presence:
             self._wrist_source = source
             self._wrist.open(_gap(shown, wrist))
         wanted = _beside(wrist, self._wrist.close(dt_s, RETURN_HALF_LIFE_S))
-        step = _gap(wanted, shown)
-        if self._guard.is_reachable(float(np.linalg.norm(step[:3])), float(np.linalg.norm(step[3:])), dt_s):
+        if self._guard.is_reachable(*_apart(shown.tolist(), wanted.tolist()), dt_s):
             return wanted
         self._wrist.open(_gap(shown, wrist))
         return shown
+
+
+def _apart(one: Sequence[float], other: Sequence[float]) -> tuple[float, float]:
+    """How far two poses are from each other, metres and radians; NumPy would take ten times as long for two."""
+    cosine = abs(one[3] * other[3] + one[4] * other[4] + one[5] * other[5] + one[6] * other[6])
+    return math.dist(one[:3], other[:3]), 2.0 * math.acos(min(cosine, 1.0))
 
 
 def _gap(shown: Array, wrist: Array) -> Array:
