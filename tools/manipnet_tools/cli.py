@@ -56,6 +56,15 @@ VERBS = {
             "take.mcap --mesh Box=hammer.obj --out hammer.npz       the same take with another object",
         ),
     ),
+    "batch": Verb(
+        "fingers for a folder of takes, on all processors or a cluster",
+        "manipnet_tools.batch.command",
+        "BatchOptions",
+        (
+            "takes --mesh mug1=mug1.obj --mesh cup1=cup1.obj --out fingers",
+            "takes --mesh mug1=mug1.obj --out fingers --ray 192.168.1.7:6379      on a Ray cluster",
+        ),
+    ),
     "export": Verb(
         "hands and objects for other programs: BVH, glTF, CSV",
         "manipnet_tools.export.command",

@@ -1,0 +1,157 @@
+"""A batch on a Ray cluster. Jobs travel with their files, so the machines need no disk in common, only the same
+version of this program. A few jobs more than there are processors are on their way at a time, so memory is bounded.
+
+Source: docs.ray.io, "Tasks" and "Using ray.wait to limit the number of pending tasks".
+"""
+
+import hashlib
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory, gettempdir
+from typing import Any, Final
+
+import ray
+from ray.exceptions import RayError
+
+from manipnet_tools.batch.job import Job, Outcome, do, failure, finished, keep, prepare, take_files
+from manipnet_tools.batch.local import Progress
+
+OWN: Final = "local"
+"""In the place of an address: a cluster of our own on this machine, for as long as the batch takes."""
+OBJECT_STORE_BYTES: Final = 256 << 20
+AHEAD: Final = 2
+"""Jobs on their way beyond those that can run at once."""
+
+Files = dict[str, bytes]
+
+
+class ClusterError(ValueError):
+    """A cluster that cannot be used; the text says which, why, and what to do."""
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A job with its files."""
+
+    name: str
+    take: Files
+    folder: str | None
+    """The take's name where it is a folder."""
+    look_ahead_s: float
+
+
+@contextmanager
+def cluster(address: str, processes: int) -> Iterator[int]:
+    """Join the cluster at `address`, or start one of our own; gives its number of processors.
+
+    At the end a cluster of our own is shut down; another's is only left.
+    """
+    options: dict[str, Any] = {"address": address, "log_to_driver": False, "logging_level": logging.ERROR}
+    if address == OWN:
+        options |= {"num_cpus": processes, "object_store_memory": OBJECT_STORE_BYTES, "include_dashboard": False}
+    try:
+        ray.init(**options)
+    except (ConnectionError, RuntimeError, ValueError, OSError) as error:
+        remedy = f"give the address `ray start --head` shows, auto for this machine's, or {OWN}"
+        raise ClusterError(f"--ray {address}: no cluster there ({str(error).splitlines()[0]}); {remedy}") from None
+    try:
+        yield max(1, int(ray.cluster_resources().get("CPU", 1)))
+    finally:
+        ray.shutdown()
+
+
+def run_there(jobs: Sequence[Job], processors: int, progress: Progress) -> Iterator[Outcome]:
+    """Do the jobs on the cluster that was joined; outcomes as they come, results written here."""
+    if not jobs:
+        return
+    model = ray.put(_read(sorted(file for file in jobs[0].model.iterdir() if file.is_file())))
+    meshes = {name: ray.put((file.name, file.read_bytes())) for name, file in jobs[0].meshes.items()}
+    remote = ray.remote(num_cpus=1, max_retries=1)(_do_parcel)
+    running: dict[Any, Job] = {}
+    for job in jobs:
+        while len(running) >= processors + AHEAD:
+            yield _next(running)
+        try:
+            prepared = prepare(job)
+            if (made := finished(prepared)) is not None:
+                yield made
+                continue
+            parcel = Parcel(job.name, _read(take_files(job.take)), _folder(job.take), job.look_ahead_s)
+        except (ValueError, OSError) as error:
+            yield failure(job, error)
+            continue
+        own = {name: meshes[name] for name in prepared.meshes}
+        running[remote.remote(parcel, model, list(own), *own.values())] = job
+        progress(job.name, 0, 0)
+    while running:
+        yield _next(running)
+
+
+def _next(running: dict[Any, Job]) -> Outcome:
+    """Wait for one of the tasks to end, and keep its result."""
+    (task,), _ = ray.wait(list(running), num_returns=1)
+    job = running.pop(task)
+    try:
+        outcome, npz, note = ray.get(task)
+    except RayError as error:
+        reason = str(error).strip().splitlines()[-1] if str(error).strip() else type(error).__name__
+        return Outcome(job.name, "failed", reason=f"its machine or process was lost: {reason}")
+    if outcome.state == "failed":
+        return outcome
+    try:
+        keep(job.out, npz)
+        keep(job.note, note)
+    except OSError as error:
+        return Outcome(job.name, "failed", reason=str(error))
+    return outcome
+
+
+def _do_parcel(
+    parcel: Parcel, model: Files, names: list[str], *meshes: tuple[str, bytes]
+) -> tuple[Outcome, bytes, bytes]:
+    """On a machine of the cluster: the job on its own disk, and the files that came out."""
+    with TemporaryDirectory(prefix="manipnet-") as folder:
+        place = Path(folder)
+        take = place / "take" / (parcel.folder or "")
+        _write(take, parcel.take)
+        take = take if parcel.folder else take / next(iter(parcel.take))
+        files = {}
+        for name, (file, content) in zip(names, meshes, strict=True):
+            _write(place / f"mesh{len(files)}", {file: content})
+            files[name] = place / f"mesh{len(files)}" / file
+        job = Job(parcel.name, take, files, _model_here(model), parcel.look_ahead_s, place / "result.npz")
+        outcome = do(job)
+        if outcome.state == "failed":
+            return outcome, b"", b""
+        return outcome, job.out.read_bytes(), job.note.read_bytes()
+
+
+def _model_here(files: Files) -> Path:
+    """The bundle's folder on this machine, written once."""
+    digest = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()[:24]
+    folder = Path(gettempdir()) / f"manipnet-model-{digest}"
+    if not folder.is_dir():
+        with TemporaryDirectory(dir=folder.parent) as part:
+            _write(Path(part) / "bundle", files)
+            try:
+                (Path(part) / "bundle").rename(folder)
+            except OSError:
+                assert folder.is_dir(), "another process was first"
+    return folder
+
+
+def _folder(take: Path) -> str | None:
+    return take.name if take.is_dir() else None
+
+
+def _read(files: Sequence[Path]) -> Files:
+    return {file.name: file.read_bytes() for file in files}
+
+
+def _write(folder: Path, files: Files) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)

@@ -1,0 +1,143 @@
+"""One take of a batch: what its result depends on, and making it. The same on this machine and on another."""
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from manipnet import __version__
+from manipnet.network.bundle import Bundle, load_bundle
+from manipnet.synthesis import Synthesizer
+from manipnet_tools.rollout import tick_take
+from manipnet_tools.synthesize import read_shapes, synthesise, write_arrays
+from manipnet_tools.takes import Take, TakeError, read_take
+
+Advance = Callable[[int, int], None]
+"""Hears how many hand-ticks are done, of how many."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A take to synthesise."""
+
+    name: str
+    """Of the take within the batch; its result is called so."""
+    take: Path
+    meshes: Mapping[str, Path]
+    """Mesh files by object, also of objects that this take does not have."""
+    model: Path
+    """The bundle's folder."""
+    look_ahead_s: float
+    out: Path
+    """The file to write, .npz; what it was made from is beside it, .json."""
+
+    @property
+    def note(self) -> Path:
+        """Where it is written what a finished result was made from."""
+        return self.out.with_name(f"{self.out.stem}.json")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a job."""
+
+    name: str
+    state: Literal["done", "skipped", "failed"]
+    frames: int = 0
+    seconds: float = 0.0
+    """How long it took."""
+    reason: str = ""
+    """Why it failed."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A job whose take has been read: its own meshes, and the hash of everything its result depends on."""
+
+    job: Job
+    take: Take
+    meshes: dict[str, Path]
+    key: str
+
+
+def do(job: Job, advance: Advance = lambda done, total: None) -> Outcome:
+    """Synthesise one take unless its result is there. What is wrong with a take is an outcome, not an exception."""
+    start_s = time.monotonic()
+    try:
+        prepared = prepare(job)
+        return finished(prepared) or _make(prepared, advance, start_s)
+    except (ValueError, OSError) as error:
+        return failure(job, error, time.monotonic() - start_s)
+
+
+def failure(job: Job, error: Exception, seconds: float = 0.0) -> Outcome:
+    """The outcome of a job that failed; that it is about this take need not be said again."""
+    return Outcome(job.name, "failed", seconds=seconds, reason=str(error).removeprefix(f"{job.take}: "))
+
+
+def prepare(job: Job) -> Prepared:
+    """Read the take, and hash what the result depends on. Raises `TakeError`, `BundleError` and `OSError`."""
+    take = read_take(job.take)
+    meshes = {name: file for name, file in sorted(job.meshes.items()) if name in take.objects}
+    if not meshes and job.meshes and job.take.suffix.lower() != ".mcap":
+        have, given = ", ".join(take.objects) or "none", ", ".join(job.meshes)
+        raise TakeError(f"{job.take}: its objects are {have}; --mesh names none of them, only {given}")
+    digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s}".encode())
+    for name, file in [*((file.name, file) for file in take_files(job.take)), *meshes.items()]:
+        digest.update(f" {name} {file.stat().st_size} ".encode() + file.read_bytes())
+    return Prepared(job, take, meshes, digest.hexdigest())
+
+
+def take_files(take: Path) -> list[Path]:
+    """The files of a take."""
+    return sorted(take.glob("*.bvh")) if take.is_dir() else [take]
+
+
+def finished(prepared: Prepared) -> Outcome | None:
+    """The outcome of an earlier run that made the same; None where there is none."""
+    try:
+        said = json.loads(prepared.job.note.read_text(encoding="utf-8"))
+        if said.pop("key") == prepared.key and prepared.job.out.is_file():
+            return replace(Outcome(**said), state="skipped")
+    except (OSError, ValueError, KeyError, TypeError):
+        pass  # not there, or cut off: made anew
+    return None
+
+
+def keep(path: Path, content: bytes) -> None:
+    """Write a file that nobody ever sees half written. Raises `OSError`."""
+    part = path.with_name(f"{path.name}.part")
+    part.write_bytes(content)
+    part.replace(path)
+
+
+def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
+    job = prepared.job
+    shapes = read_shapes([f"{name}={file}" for name, file in prepared.meshes.items()], prepared.take, job.take)
+    ticks = tick_take(prepared.take, job.look_ahead_s)
+    total, done = 2 * len(ticks.time_s), 0
+
+    def count(steps: int) -> None:
+        nonlocal done
+        done += steps
+        advance(done, total)
+
+    advance(0, total)
+    hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count)
+    part = job.out.with_name(f"{job.out.name}.part")
+    with part.open("wb") as file:
+        write_arrays(file, ticks, shapes, hands)
+    part.replace(job.out)
+    outcome = Outcome(job.name, "done", len(ticks.time_s), time.monotonic() - start_s)
+    keep(job.note, json.dumps(asdict(outcome) | {"key": prepared.key}, indent=2).encode())
+    return outcome
+
+
+@lru_cache(maxsize=1)
+def _bundle(model: Path) -> Bundle:
+    """One model per process."""
+    return load_bundle(model)
