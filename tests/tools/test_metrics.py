@@ -113,3 +113,14 @@ def test_longest_drift():
     error = np.concatenate([np.full(30, 0.01), np.full(12, 0.04), [0.0], np.full(18, 0.04)])
     assert metrics.longest_drift_s(error) == pytest.approx(0.3)
     assert metrics.longest_drift_s(np.zeros(5)) == 0.0
+
+
+def test_only_fingertips_that_touch_in_two_frames_on_end_slide():
+    tip = skeleton.CAPSULE_RADII_M[18]
+    positions = hand_with_pinky_at(tip, frames=4)
+    positions[:, 21, 0] = [0.0, 0.001, 0.003, 0.003]
+    positions[:, 17, 0] = [0.0, 1.0, 2.0, 3.0]  # a thumb that moves, far from the floor
+    assert metrics.slide_mm_s(positions, gaps_of(positions)) == pytest.approx(60.0 * (1 + 2 + 0) / 3)
+    positions[1, [16, 21], 1] += 0.01
+    assert metrics.slide_mm_s(positions, gaps_of(positions)) == pytest.approx(0.0)
+    assert np.isnan(metrics.slide_mm_s(positions[:1], gaps_of(positions[:1])))

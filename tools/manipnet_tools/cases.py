@@ -72,9 +72,15 @@ class Case:
 
     def gaps_of(self, side: Side, positions: Array) -> Gaps:
         """Gaps of a hand with joints `(T, 22, 3)` in the canonical wrist frame, worn on this take's wrist."""
+        return metrics.capsule_gaps(self._in_world(side, positions), self.T_world_object, self.shape)
+
+    def on_object(self, side: Side, positions: Array) -> Array:
+        """The joints of such a hand in the object's frame, `(T, 22, 3)`."""
+        return geometry.transform(geometry.invert(self.T_world_object)[:, None], self._in_world(side, positions))
+
+    def _in_world(self, side: Side, positions: Array) -> Array:
         p_wrist = geometry.mirror_points(positions) if side == "left" else positions
-        p_world = geometry.transform(self.ticks.bodies[f"{side}_wrist"].poses[:, None], p_wrist)
-        return metrics.capsule_gaps(p_world, self.T_world_object, self.shape)
+        return geometry.transform(self.ticks.bodies[f"{side}_wrist"].poses[:, None], p_wrist)
 
 
 def load_cases(data: Path, names: tuple[str, ...] = ()) -> list[Case]:

@@ -24,11 +24,13 @@ SETTLE_FRAMES = 60
 
 NEAR_M, IDLE_M, CONTACT_M = 0.03, 0.15, 0.005
 DEEP_M, SHARE_M, DRIFT_M = 0.015, 0.01, 0.03
+TOUCH_M = 0.004
 AXIS_SAMPLES = 7
 PALM_START = 0.3
 """Palm capsules are sampled from 30 % of the way from wrist to knuckle: the rest is forearm side."""
 
 _START, _END = skeleton.CAPSULE_JOINTS.T
+_TIP_CAPSULES = np.flatnonzero(_END >= skeleton.BONE_COUNT)
 _FRACTIONS = np.linspace(np.where(_START == 0, PALM_START, 0.0), 1.0, AXIS_SAMPLES, axis=1)
 
 
@@ -128,6 +130,17 @@ def contact_f1(gaps: Gaps, captured: Gaps) -> float:
     ours, theirs = gaps.gap < CONTACT_M, captured.gap < CONTACT_M
     total = ours.sum() + theirs.sum()
     return float(2.0 * (ours & theirs).sum() / total) if total else float("nan")
+
+
+def slide_mm_s(p_object: Array, gaps: Gaps) -> float:
+    """Mean speed over the object's surface of fingertips whose capsules touch it (4 mm) in two frames on end.
+
+    `p_object (T, 22, 3)` are joint positions in the object's frame; nan where none touches.
+    """
+    touching = gaps.gap[:, _TIP_CAPSULES] < TOUCH_M
+    speed = np.linalg.norm(np.diff(p_object[:, skeleton.BONE_COUNT :], axis=0), axis=-1) * RATE_HZ
+    held = speed[touching[1:] & touching[:-1]]
+    return 1000.0 * float(held.mean()) if len(held) else float("nan")
 
 
 def smoothness_cm_s2(positions: Array, frames: Mask | None = None) -> float:

@@ -24,6 +24,7 @@ MEASURES = {
     "penetration_cm": ("penetration, cm", "{:.3f}", 1.0),
     "over_1cm": ("over 1 cm deep, %", "{:.1f}", 100.0),
     "deep": ("deep frames, %", "{:.1f}", 100.0),
+    "slide_mm_s": ("sliding tips, mm/s", "{:.0f}", 1.0),
     "smoothness": ("smoothness, cm/s²", "{:.0f}", 1.0),
     "smoothness_ratio": ("smoothness ratio", "{:.2f}", 1.0),
     "idle_ratio": ("idle ratio", "{:.2f}", 1.0),

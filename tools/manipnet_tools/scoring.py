@@ -29,6 +29,7 @@ class Score:
     penetration_cm: float
     over_1cm: float
     deep: float
+    slide_mm_s: float
     smoothness: float
     smoothness_ratio: float
     idle_ratio: float
@@ -76,6 +77,7 @@ def _of_hand(
         "penetration_cm": metrics.penetration_cm(gaps[counts]),
         "over_1cm": metrics.deeper_share(gaps[counts]),
         "deep": metrics.deep_frames(gaps[counts]),
+        "slide_mm_s": metrics.slide_mm_s(case.on_object(side, positions)[counts], gaps[counts]),
         "smoothness": smoothness,
         "smoothness_ratio": smoothness / metrics.smoothness_cm_s2(captured, counts),
         "idle_ratio": metrics.smoothness_cm_s2(positions, idle) / metrics.smoothness_cm_s2(captured, idle),
