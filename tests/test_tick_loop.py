@@ -14,12 +14,13 @@ from manipnet.geometry import quat_exp
 from manipnet.mailbox import Mailbox
 from manipnet.network.bundle import Bundle, load_bundle
 from manipnet.objects.library import LIBRARY_FOLDER
-from manipnet.props import Prop, Wardrobe
+from manipnet.props import Prop
 from manipnet.streams.bodies import BodyFrame, BodySample
 from manipnet.streams.wire import HandsMessage, encode_msgpack
 from manipnet.synthesis import HandStep, Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
 from manipnet.tick_loop import TickLoop
+from manipnet.wardrobe import Wardrobe
 
 HERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 

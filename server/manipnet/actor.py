@@ -51,14 +51,16 @@ class Hand:
         """What was shown last."""
         return self._presence.shown
 
-    def show(self, state: State, step: HandStep | None, wrist: Array | None, run: int, dt_s: float) -> ShownHand | None:
+    def show(
+        self, state: State, step: HandStep | None, wrist: Array | None, run: int, dt_s: float, known: bool
+    ) -> ShownHand | None:
         """The hand `dt_s` after the last tick: live with a `step`, else held or on its way to rest."""
         if state == "live" and step is None:
             state = "hold"
         angles = None if step is None else step.state.angles
         if state == "rest":
             self.prop = None
-        shown = self._presence.show(state, angles, wrist, run, self.prop, dt_s)
+        shown = self._presence.show(state, angles, wrist, run, self.prop, dt_s, known)
         if step is not None:
             self.memory = step.state
         elif state == "rest":
@@ -136,6 +138,10 @@ class Actor:
         self.props = [other for other in self.props if other.name != name] + [prop]
         return prop
 
+    def reshape(self, old: Shape, new: Shape) -> None:
+        """Whatever carries the shape `old` carries `new` from now on."""
+        self.props = [replace(prop, shape=new) if prop.shape is old else prop for prop in self.props]
+
     def part(self, body: BodyKey) -> str | None:
         """What this actor calls a body, given by its key in the stream or by that name; None for a stranger."""
         return self._parts.get(body) or (str(body) if body in self._parts.values() else None)
@@ -192,7 +198,8 @@ class Actor:
             wrist = plan.tick.bodies.get(f"{side}_wrist")
             tracked = wrist is not None and wrist.age_s <= HOLD_AFTER_S and not self.paused
             pose = wrist.pose if wrist is not None and (tracked or hand.shown is None) else None
-            shown = hand.show(plan.states[side], steps.get(side), pose, plan.tick.run, dt_s)
+            known = wrist is None or wrist.known
+            shown = hand.show(plan.states[side], steps.get(side), pose, plan.tick.run, dt_s, known)
             if shown is not None:
                 hands[side] = shown
         self._last = (plan.tick.run, plan.tick.index)

@@ -1,16 +1,12 @@
 """The props of one actor, and which of them a hand is about."""
 
 import math
-import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
-from manipnet.config import ObjectConfig
 from manipnet.geometry import Array
-from manipnet.objects.library import library_names, load_library_mesh
-from manipnet.objects.shape import Shape, build_shape, load_shape
+from manipnet.objects.shape import Shape
 from manipnet.presence import HOLD_AFTER_S, REST_AFTER_S
 from manipnet.synthesis import Side
 from manipnet.timeline import BodyAtTick
@@ -29,49 +25,6 @@ class Prop:
     object: str
     shape: Shape
     scale: float = 1.0
-
-
-class Wardrobe:
-    """The shapes a server has or can get: those of its rig, and the library, each built once. Thread-safe."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._built: dict[tuple[str, str, float], Shape] = {}
-        self._by_name: dict[str, Shape] = {}
-
-    def load(self, config: ObjectConfig) -> Prop:
-        """The prop of a rig's object. Raises `MeshError`."""
-        with self._lock:
-            key = (str(config.mesh.resolve()), config.unit, config.scale)
-            if key not in self._built:
-                self._built[key] = load_shape(config.mesh, config.unit, config.scale)
-            shape = self._built[key]
-            self._by_name.setdefault(shape.name, shape)
-            return Prop(config.name, shape.name, shape)
-
-    def names(self) -> tuple[str, ...]:
-        """What `shape` can be asked for: the rig's meshes by file name, and the library."""
-        with self._lock:
-            return tuple(sorted({*self._by_name, *library_names()}))
-
-    def shape(self, name: str) -> Shape:
-        """A shape by name; one of the library is built on first use. Raises `MeshError`."""
-        with self._lock:
-            if name not in self._by_name:
-                self._by_name[name] = build_shape(load_library_mesh(name))
-            return self._by_name[name]
-
-    def add(self, file: Path, unit: str = "m") -> Shape:
-        """A mesh file more to choose from, in the place of one of the same name. Raises `MeshError`."""
-        shape = load_shape(file, unit)  # takes a while: nobody should wait for the lock
-        with self._lock:
-            self._by_name[shape.name] = shape
-        return shape
-
-    def shapes(self) -> tuple[Shape, ...]:
-        """Those built so far."""
-        with self._lock:
-            return tuple(self._by_name.values())
 
 
 def choose_prop(

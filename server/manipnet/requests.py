@@ -16,11 +16,12 @@ from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES
 from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.mailbox import BusyError, Mailbox
 from manipnet.objects.mesh import UNITS_M, MeshError
-from manipnet.props import Prop, Wardrobe
+from manipnet.props import Prop
 from manipnet.status import status
 from manipnet.streams.wire import VERSION
 from manipnet.telemetry import Counters, Timings
 from manipnet.timeline import MAX_LOOK_AHEAD_S, TICK_HZ
+from manipnet.wardrobe import Wardrobe
 
 MAX_PATH: Final = 1024
 T = TypeVar("T")
@@ -112,7 +113,11 @@ class Requests:
                 for actor in self._actors
             }
 
-        return {"objects": list(self._wardrobe.names()), "bodies": self._cast.ask(carried)}
+        return {
+            "objects": list(self._wardrobe.names()),
+            "bodies": self._cast.ask(carried),
+            "problems": self._wardrobe.problems(),
+        }
 
     def _mesh(self, request: Request) -> dict[str, Any]:
         actor = self._cast.actor(request)

@@ -18,9 +18,10 @@ from manipnet.flight_recorder import FlightRecorder
 from manipnet.mailbox import Mailbox
 from manipnet.metrics import MetricsPage
 from manipnet.network.bundle import load_bundle
+from manipnet.objects.shape import Shape
 from manipnet.page.host import LivePage
 from manipnet.placing import Placing
-from manipnet.props import Prop, Wardrobe
+from manipnet.props import Prop
 from manipnet.publisher import Publisher
 from manipnet.recorder import Recorder, carried
 from manipnet.requests import Cast, Requests
@@ -34,6 +35,7 @@ from manipnet.surroundings import Surroundings
 from manipnet.synthesis import Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
 from manipnet.tick_loop import TickLoop
+from manipnet.wardrobe import MeshWatch, Wardrobe
 from manipnet.warm_up import warm_up
 
 if TYPE_CHECKING:
@@ -68,7 +70,8 @@ class Server:
         self._config, self._say = config, say
         self.session = secrets.token_hex(8)
         self.counters, self.timings = Counters(), Timings()
-        self._mailbox, self._wardrobe, self._watch = Mailbox(self.counters), Wardrobe(), SilenceWatch()
+        self._mailbox, self._watch = Mailbox(self.counters), SilenceWatch()
+        self._wardrobe = Wardrobe(config.objects, config.objects_unit)
         self._around = Surroundings(self._mailbox.put)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model, config.provider)
@@ -103,6 +106,9 @@ class Server:
         opened.callback(recorder.stop)
         publisher = Publisher(config, counters, self._keys, recorder.note)
         opened.callback(publisher.close)
+        meshes = MeshWatch(self._wardrobe, lambda old, new: cast.ask(lambda: self._reshape(old, new)))
+        opened.callback(meshes.stop)
+        meshes.start()
         handlers = {**self._handlers(cast), **recorder.handlers()}
         handlers |= self._around.handlers(handlers["status"])
         control = Control(config.host, config.control_port, handlers, counters, self._keys)
@@ -161,6 +167,10 @@ class Server:
             self.timings,
         )
         return {**requests.handlers(), **Placing(cast, self._config.rig).handlers()}
+
+    def _reshape(self, old: Shape, new: Shape) -> None:
+        for actor in self._actors:
+            actor.reshape(old, new)
 
     def _about(self, cast: Cast) -> tuple[dict[str, str], list[Prop]]:
         """What a recording depends on."""
