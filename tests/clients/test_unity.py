@@ -55,7 +55,7 @@ def test_core_uses_no_engine_type():
 def test_components_pose_a_humanoid_joints_and_a_body(glue):
     with publishing() as (_, tcp, _):
         done = subprocess.run([*glue, tcp], capture_output=True, encoding="utf-8", timeout=60)
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stderr + done.stdout
     lines = dict(line.split(" ", 1) for line in done.stdout.splitlines())
     assert "no bone for Hand, ThumbProximal" in lines["error:"]
     wrist, hand, joint, body = (np.array(lines[k].split(), float) for k in ("wrist", "hand", "joint", "body"))
@@ -64,4 +64,15 @@ def test_components_pose_a_humanoid_joints_and_a_body(glue):
     forward = quat_multiply(to_unity(wrist)[3:], np.array([0.0, 1.0, 0.0, 0.0]))
     assert abs(joint[3:] @ forward) == pytest.approx(1.0, abs=1e-5)
     assert body[0] == pytest.approx(-wrist[0], abs=1e-5)
+    finger, by_name, xr = (np.array(lines[k].split(), float) for k in ("finger", "byname", "xr"))
+    np.testing.assert_allclose(by_name, finger, atol=1e-5)  # the same skeleton, found by Mixamo's names
+    palm = np.array(lines["palm"].split(), float)
+    np.testing.assert_allclose([xr, palm], [joint, joint], atol=1e-5)
+    assert lines["made"] == "26"  # XR Hands' R_Wrist and R_IndexTip were there
+    assert lines["sample"] == "2 52"
+    drawn = [text for key, text in lines.items() if key.startswith("drawn")]
+    assert any("tcp://HOST:PORT" in text for text in drawn)
+    for start in ("State: connected", "Rate: ", "Age: ", "Lost, late, refused: 0, "):
+        assert any(text.startswith(start) for text in drawn), start
+    assert lines["setup"] == f"{tcp} True"
     assert lines["state"] == "off"

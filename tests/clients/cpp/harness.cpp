@@ -183,6 +183,7 @@ public:
     }
 
     std::string Figures() const {
+        const long allocations = Allocations;
         const Stats s = From.GetStats();
         std::ostringstream out;
         out << "{\"state\":" << Quote(s.State) << ",\"received\":" << s.Received << ",\"lost\":" << s.Lost << ",\"late\":" << s.Late
@@ -190,7 +191,7 @@ public:
             << ",\"rate_hz\":" << Number(s.RateHz) << ",\"age_s\":" << (s.AgeS < 0 ? "null" : Number(s.AgeS))
             << ",\"transit_s\":" << Number(s.TransitS) << ",\"weight\":" << Number(static_cast<double>(Weight))
             << ",\"shown_seq\":" << Shown.Seq << ",\"session\":" << Quote(Shown.Session.Text) << ",\"shows\":" << Shows
-            << ",\"allocations\":" << Allocations << "}";
+            << ",\"allocations\":" << allocations << "}";
         return out.str();
     }
 

@@ -5,6 +5,7 @@ using System.Reflection;
 using System.Threading;
 using ManipNet.Client;
 using ManipNet.Client.Unity;
+using UnityEditor;
 using UnityEngine;
 
 /// <summary>Runs the components on working stubs of the engine against a live server: `glue ADDRESS`.</summary>
@@ -15,6 +16,8 @@ static class Glue
         new Vector3(0.03f, 0.02f, -0.01f), new Vector3(0.09f, 0.025f, 0f), new Vector3(0.095f, 0f, 0f),
         new Vector3(0.09f, -0.02f, 0f), new Vector3(0.08f, -0.04f, 0f),
     };
+
+    static readonly string[] Fingers = { "Thumb", "Index", "Middle", "Ring", "Pinky" };
 
     static int Main(string[] args)
     {
@@ -27,56 +30,129 @@ static class Glue
         var receiver = scene.AddComponent<ManipNetReceiver>();
         receiver.Address = args[0];
         var animator = scene.AddComponent<Animator>();
-        Transform hand = Skeleton(animator);
+        Transform hand = Skeleton(animator, "");
         var fingers = scene.AddComponent<ManipNetHand>();
         fingers.Configure(receiver, Side.Right, animator, null, true);
         var joints = scene.AddComponent<ManipNetJoints>();
         joints.Configure(receiver, Side.Right, null);
+        Transform named = Skeleton(null, "mixamorig:RightHand");
+        var byName = scene.AddComponent<ManipNetHand>();
+        byName.Configure(receiver, Side.Right, null, named, true);
+        var xr = new GameObject("R_Wrist").transform;
+        var own = new GameObject("R_IndexTip").transform;
+        own.SetParent(xr, false);
+        var xrHand = xr.gameObject.AddComponent<ManipNetJoints>();
+        xrHand.Configure(receiver, Side.Right, null);
         var nameless = scene.AddComponent<ManipNetHand>();
         nameless.Configure(receiver, Side.Left, null, scene.transform, false);
         Call(receiver, "OnEnable");
         Call(joints, "Start");
+        Call(xrHand, "Start");
         var prop = new GameObject("cube");
         var body = prop.AddComponent<ManipNetBody>();
         typeof(ManipNetBody).GetField("receiver", BindingFlags.NonPublic | BindingFlags.Instance).SetValue(body, receiver);
         typeof(ManipNetBody).GetField("body", BindingFlags.NonPublic | BindingFlags.Instance).SetValue(body, "cube");
-        for (int i = 0; i < 1000 && (!receiver.HasHands || receiver.Stats.Received < 10); i++)
+        for (int i = 0; i < 1000 && (!receiver.HasHands || receiver.Weight < 1f); i++)
         {
             Thread.Sleep(10);
             Call(receiver, "LateUpdate");
         }
-        foreach (MonoBehaviour shown in new MonoBehaviour[] { fingers, joints, body }) Call(shown, "LateUpdate");
+        foreach (MonoBehaviour shown in new MonoBehaviour[] { fingers, byName, joints, xrHand, body }) Call(shown, "LateUpdate");
         Print("wrist", receiver.Hands.Right.Wrist);
         Print("hand", Flat(hand));
         Print("joint", Flat(scene.transform.All().Last(t => t.name == "IndexProximal")));
         Print("body", Flat(prop.transform));
+        Print("finger", Flat(animator.Bones[HumanBodyBones.RightThumbProximal + 5]));
+        Print("byname", Flat(named.All().First(t => t.name.EndsWith("Index3"))));
+        Print("xr", Flat(own));
+        Print("palm", Flat(xr.All().First(t => t.name == "Palm")));
+        Console.WriteLine("made " + xr.All().Count());
+        Sample(args[0]);
+        Window(args[0]);
         Call(receiver, "OnDisable");
         Console.WriteLine("state " + receiver.Stats.State);
         return 0;
     }
 
-    /// <summary>A hand whose bones lie along x, as ours, mirrored into Unity's axes.</summary>
-    static Transform Skeleton(Animator animator)
+    /// <summary>The sample for the Package Manager, as if play had been pressed.</summary>
+    static void Sample(string address)
     {
-        var hand = new GameObject("RightHand").transform;
-        animator.Bones[HumanBodyBones.RightHand] = hand;
+        var place = new GameObject("sample");
+        Call(place.AddComponent<HandsSample>(), "Start");
+        place.GetComponent<ManipNetReceiver>().Address = address;
+        Call(place.GetComponent<ManipNetReceiver>(), "OnEnable");
+        for (int i = 0; i < 1000 && !place.GetComponent<ManipNetReceiver>().HasHands; i++)
+        {
+            Thread.Sleep(10);
+            Call(place.GetComponent<ManipNetReceiver>(), "LateUpdate");
+        }
+        ManipNetJoints[] hands = place.GetComponentsInChildren();
+        foreach (ManipNetJoints hand in hands) Call(hand, "Start");
+        foreach (ManipNetJoints hand in hands) Call(hand, "LateUpdate");
+        Console.WriteLine("sample " + hands.Length + " " + hands.Sum(hand => hand.transform.childCount));
+        Call(place.GetComponent<ManipNetReceiver>(), "OnDisable");
+    }
+
+    static ManipNetJoints[] GetComponentsInChildren(this GameObject place)
+    {
+        return place.transform.All().Select(t => t.gameObject.GetComponent<ManipNetJoints>()).Where(found => found != null).ToArray();
+    }
+
+    /// <summary>A person tries a wrong address, the right one, sets up a character, and stops.</summary>
+    static void Window(string address)
+    {
+        var window = new ManipNetWindow();
+        Call(window, "OnEnable");
+        EditorGUILayout.Typed = "nowhere";
+        Press(window, "Try");
+        EditorGUILayout.Typed = address;
+        Press(window, "Try");
+        for (int i = 0; i < 1000 && !EditorGUILayout.Drawn.Any(line => line.StartsWith("Rate: ") && line != "Rate: 0.0 Hz"); i++)
+        {
+            Thread.Sleep(10);
+            Press(window, null);
+        }
+        var character = new GameObject("character");
+        Skeleton(character.AddComponent<Animator>(), "");
+        Selection.activeGameObject = character;
+        Press(window, "Put fingers on the selected character");
+        Press(window, "Stop");
+        Call(window, "OnDisable");
+        int k = 0;
+        foreach (string line in EditorGUILayout.Drawn.Distinct()) Console.WriteLine("drawn" + k++ + " " + line);
+        Console.WriteLine("setup " + character.GetComponent<ManipNetReceiver>().Address + " " + (character.GetComponent<ManipNetHand>() != null));
+    }
+
+    static void Press(ManipNetWindow window, string button)
+    {
+        GUILayout.Pressed = button;
+        Call(window, "OnGUI");
+    }
+
+    /// <summary>
+    /// A hand whose bones lie along x, as ours, mirrored into Unity's axes: a Humanoid's, or with `names` for bones.
+    /// </summary>
+    static Transform Skeleton(Animator animator, string names)
+    {
+        var hand = new GameObject(animator == null ? names : "RightHand").transform;
+        if (animator != null) animator.Bones[HumanBodyBones.RightHand] = hand;
         for (int finger = 0; finger < 5; finger++)
         {
             Transform parent = hand;
             for (int part = 0; part < 3; part++)
             {
-                var bone = new GameObject("bone").transform;
+                var bone = new GameObject(animator == null ? names + Fingers[finger] + (part + 1) : "bone").transform;
                 bone.SetParent(parent, false);
                 Vector3 k = Knuckles[finger];
                 bone.position = new Vector3(-k.x - 0.03f * part, k.y, k.z);
-                animator.Bones[HumanBodyBones.RightThumbProximal + 3 * finger + part] = bone;
+                if (animator != null) animator.Bones[HumanBodyBones.RightThumbProximal + 3 * finger + part] = bone;
                 parent = bone;
             }
         }
         return hand;
     }
 
-    static void Call(MonoBehaviour behaviour, string method)
+    static void Call(object behaviour, string method)
     {
         behaviour.GetType().GetMethod(method, BindingFlags.NonPublic | BindingFlags.Instance).Invoke(behaviour, null);
     }

@@ -57,8 +57,9 @@ namespace ManipNet.Client.Unity
             if (receiver == null || !receiver.HasHands || receiver.Weight <= 0f) return;
             HandFrame hand = receiver.Hands.Hand(side);
             if (!hand.Present) return;
-            for (int i = 0; i < _joints.Length; i++)
+            for (int k = 0; k < _joints.Length; k++)
             {
+                int i = k < 2 ? 1 - k : k; // the wrist before the palm, which hangs on it in XR Hands' rigs
                 _joints[i].position = ManipNetPose.Position(hand.Joints, 7 * i);
                 _joints[i].rotation = ManipNetPose.Rotation(hand.Joints, 7 * i) * ManipNetPose.ForwardAlongBone;
             }

@@ -1,5 +1,6 @@
 // The few types of the editor and of NUnit that the package uses: enough to compile against.
 using System;
+using System.Collections.Generic;
 using UnityEngine;
 
 namespace UnityEditor
@@ -19,11 +20,14 @@ namespace UnityEditor
         public static event Action beforeAssemblyReload { add { } remove { } }
     }
 
+    /// <summary>Drawn keeps what was drawn, Typed is what a person types.</summary>
     public static class EditorGUILayout
     {
-        public static string TextField(string label, string text) { return text; }
-        public static void LabelField(string label, string text) { }
-        public static void HelpBox(string text, MessageType type) { }
+        public static readonly List<string> Drawn = new List<string>();
+        public static string Typed;
+        public static string TextField(string label, string text) { return Typed ?? text; }
+        public static void LabelField(string label, string text) { Drawn.Add(label + ": " + text); }
+        public static void HelpBox(string text, MessageType type) { Drawn.Add(text); }
         public static void Space() { }
     }
 
@@ -35,12 +39,16 @@ namespace UnityEditor
 
     public static class EditorUtility
     {
-        public static bool DisplayDialog(string title, string message, string ok) { return true; }
+        public static bool DisplayDialog(string title, string message, string ok)
+        {
+            EditorGUILayout.Drawn.Add(message);
+            return true;
+        }
     }
 
     public static class Selection
     {
-        public static GameObject activeGameObject { get { return null; } }
+        public static GameObject activeGameObject { get; set; }
     }
 
     public static class Undo

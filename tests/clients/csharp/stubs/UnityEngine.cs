@@ -94,6 +94,7 @@ namespace UnityEngine
 
     public sealed class GameObject : Object
     {
+        public static readonly List<Component> Everything = new List<Component>();
         readonly List<Component> _components = new List<Component>();
         public GameObject(string name = "") { this.name = name; AddComponent<Transform>(); }
         public Transform transform { get { return (Transform)_components[0]; } }
@@ -102,6 +103,7 @@ namespace UnityEngine
         {
             var made = new T { gameObject = this };
             _components.Add(made);
+            Everything.Add(made);
             return made;
         }
         public static GameObject CreatePrimitive(PrimitiveType type) { return new GameObject(type.ToString()); }
@@ -125,12 +127,19 @@ namespace UnityEngine
 
     public static class Resources
     {
-        public static T[] FindObjectsOfTypeAll<T>() { return new T[0]; }
+        public static T[] FindObjectsOfTypeAll<T>() { return GameObject.Everything.OfType<T>().ToArray(); }
     }
 
+    /// <summary>Whoever sets Pressed presses the button of that name, once.</summary>
     public static class GUILayout
     {
-        public static bool Button(string text) { return false; }
+        public static string Pressed;
+        public static bool Button(string text)
+        {
+            if (text != Pressed) return false;
+            Pressed = null;
+            return true;
+        }
     }
 
     [AttributeUsage(AttributeTargets.Field)] public sealed class SerializeField : Attribute { }
