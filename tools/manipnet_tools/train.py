@@ -48,6 +48,8 @@ class TrainConfig:
     batch: int = 128
     learning_rate: float = 7e-4
     weight_decay: float = 1e-2
+    huber: float = 0.5
+    """Errors beyond this many deviations count by their size, not its square; 0 squares all."""
     average: float = 0.999
     """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
     kept: float = 0.0
@@ -125,13 +127,18 @@ class Learner:
             inputs, outputs = torch.from_numpy(samples.inputs[rows]), torch.from_numpy(samples.outputs[rows])
             with torch.autocast("cpu", torch.bfloat16):
                 predicted = self._last.normalised(inputs).float()
-            loss = (predicted - self._last.normalise_outputs(inputs, outputs)).square().mean()
+            loss = self._loss(predicted, self._last.normalise_outputs(inputs, outputs))
             self._optimizer.zero_grad(set_to_none=True)
             loss.backward()
             self._optimizer.step()
             self._average.update_parameters(self._last)
             losses.append(float(loss.detach()))
         return float(np.mean(losses))
+
+    def _loss(self, predicted: torch.Tensor, wanted: torch.Tensor) -> torch.Tensor:
+        if self._config.huber:
+            return torch.nn.functional.huber_loss(predicted, wanted, delta=self._config.huber)
+        return torch.nn.functional.mse_loss(predicted, wanted)
 
 
 class Lessons:
