@@ -8,12 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipnet.actor import ShownHand
 from manipnet.geometry import compose, mirror_points, quat_conjugate, quat_exp, quat_log, quat_multiply, transform
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES, JOINT_NAMES, OFFSETS_M
 from manipnet.hand.surface import FACES, skin
+from manipnet.messages import hand_poses
 from manipnet.objects.library import load_library_mesh
+from manipnet.presence import Shown
+from manipnet.recording import RecordingWriter, mesh_file
+from manipnet.streams.wire import BodyPose, HandsMessage
 from manipnet.synthesis import hand_to_world
+from manipnet_tools import cli
 from manipnet_tools.bvh import read_bvh
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
@@ -234,3 +240,79 @@ def test_a_hand_of_another_size_is_exported_at_its_size(performance: Performance
     assert np.allclose(
         Gltf(tmp_path / "small.glb").skinned("right_hand", 5), transform(hand.wrist[5], vertices), atol=2e-6
     )
+
+
+def message(seq: int, t_s: float, x: float, state: str = "live", actor: str = "ann") -> HandsMessage:
+    """A hands message of a half-closed left hand at `x`."""
+    shown = Shown(state, DOF_LIMITS_RAD @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    hands = hand_poses({"left": ShownHand(shown, "Box")}, 0.9)
+    pose = np.array([x, 1.1, 0.0, 0.0, 0.0, 0.0, 1.0])
+    bodies = (BodyPose(True, pose, "left_wrist"), BodyPose(state == "live", pose, "Box"))
+    return HandsMessage("session", actor, seq, t_s, t_s + 0.6, 0.5, hands, bodies)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """Two actors; the first one's performance has a gap, a second of waiting before it, and a lost stretch."""
+    cube = load_library_mesh("cube")
+    path = tmp_path / "stage.mcap"
+    with RecordingWriter(path, {}, {"Box.ply": mesh_file(cube.vertices, cube.faces, 0.5)}) as writer:
+        for k in range(10):
+            writer.write_hands(message(k, 900.0 + k / 60, 9.0), k * 16_666_667)
+        for k in range(60):
+            if k not in (20, 21):
+                writer.write_hands(message(10 + k, k / 60, k / 100, "hold" if 30 <= k < 35 else "live"), k * 16_666_667)
+            writer.write_hands(message(k, k / 60, 5.0, actor="bob"), k * 16_666_667)
+    return path
+
+
+def test_a_recording_is_exported_tick_by_tick(recording: Path, tmp_path: Path, angles) -> None:
+    stage = read_performance(recording)
+    assert (len(stage.time_s), stage.rate_hz, list(stage.hands), list(stage.objects)) == (60, 60.0, ["left"], ["Box"])
+    hand = stage.hands["left"]
+    assert np.flatnonzero(~hand.live).tolist() == [20, 21, 30, 31, 32, 33, 34]
+    assert np.allclose(hand.wrist[:, 0], [min(k, 19) / 100 if k in (20, 21) else k / 100 for k in range(60)])
+    assert hand.scale == pytest.approx(0.9)
+    assert stage.objects["Box"].tracked.sum() == 53
+    assert np.ptp(stage.meshes["Box"].vertices) == pytest.approx(0.5 * np.ptp(load_library_mesh("cube").vertices))
+    assert read_performance(recording, "bob").hands["left"].wrist[0, 0] == 5.0
+    positions, rotations = forward_kinematics(DOF_LIMITS_RAD @ [0.5, 0.5])
+    joints, _ = hand_to_world("left", hand.wrist[3], 0.9 * positions, rotations)
+    assert np.allclose(hand.world()[0][3], joints, atol=1e-9)
+
+
+@pytest.mark.parametrize("form", ["gltf s.glb", "bvh s", "csv s.csv"])
+def test_the_command_writes_every_format(
+    recording: Path, tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kind, name = form.split()
+    assert cli.main(["export", str(recording), "--format", kind, "--out", str(tmp_path / name)]) == 0
+    assert (tmp_path / name).exists()
+    said = " ".join(capsys.readouterr().err.split())
+    assert "60 frames at 60 Hz (1.0 s), left, objects Box; left held or at rest in 7 frames" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["stage.mcap", "--format", "gltf", "--out", "x.fbx"], "must end in .glb or .gltf"),
+        (["stage.mcap", "--format", "csv", "--out", "no/x.csv"], "its folder does not exist"),
+        (["stage.mcap", "--format", "csv", "--out", "x.csv", "--actor", "eve"], "no actor 'eve'; it has ann, bob"),
+        (["stage.mcap", "--format", "csv", "--out", "x.csv", "--right-handed"], "is right-handed anyway"),
+        (["stage.mcap", "--format", "gltf", "--out", "x.glb", "--mesh", "Cup=c.obj"], "NAME one of Box"),
+        (["walk.txt", "--format", "csv", "--out", "x.csv"], "holds no fingers; make them first: manipnet synthesize"),
+        (["bad.npz", "--format", "csv", "--out", "x.csv"], "is no file of `manipnet synthesize`"),
+        (["other.npz", "--format", "csv", "--out", "x.csv"], "is no file of `manipnet synthesize`"),
+        (["gone.npz", "--format", "csv", "--out", "x.csv"], "cannot be read (No such file"),
+    ],
+)
+def test_what_cannot_be_exported_gets_the_remedy(
+    recording: Path, arguments: list[str], complaint: str, capsys: pytest.CaptureFixture[str], monkeypatch
+) -> None:
+    monkeypatch.chdir(recording.parent)
+    Path("walk.txt").write_text("120\n" + 3 * (",".join(3 * ["0,0,0,1,0,0,0"]) + "\n"))
+    Path("bad.npz").write_bytes(b"not a zip")
+    np.savez("other.npz", time=np.zeros(3))
+    assert cli.main(["export", *arguments]) == 1
+    assert complaint in " ".join(capsys.readouterr().err.split())
+    assert not Path("x.csv").exists()
