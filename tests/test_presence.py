@@ -158,3 +158,14 @@ def test_angles_outside_the_limits_or_too_fast_are_kept_in_and_counted() -> None
     assert steps.max() == pytest.approx(MAX_SPEED_RAD_S * TICK_S)
     assert np.all(shown.angles <= FIST)
     assert counters.snapshot()["output_guarded"] == {"limit": 1, "speed": 1}
+
+
+def test_a_wrist_that_was_guessed_glides_to_where_it_is() -> None:
+    hand = presence()
+    run(hand, 5, "live", FIST, HERE)
+    hand.show("live", FIST, HERE, 0, "mug", TICK_S, known=False)
+    there = HERE + np.array([0.02, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    shown = run(hand, 60, "live", FIST, there)
+    ways = [each.wrist[0] - HERE[0] for each in shown]
+    assert max(b - a for a, b in pairwise([0.0, *ways])) < 0.005
+    assert ways[-1] == pytest.approx(0.02, abs=1e-4)

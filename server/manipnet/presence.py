@@ -55,6 +55,10 @@ class Ease:
         """Start from a new gap, at rest."""
         self.gap, self._speed, self._open = gap, np.zeros_like(gap), True
 
+    def change(self, gap: Array) -> None:
+        """Go on from another gap, closing it as fast as the one before."""
+        self.gap, self._open = gap, True
+
     def close(self, dt_s: float, half_life_s: float) -> Array:
         """The gap `dt_s` later; `half_life_s` is about the time in which half of it closes."""
         if not self._open:
@@ -65,7 +69,7 @@ class Ease:
         self.gap = decay * (self.gap + pull * dt_s)
         self._speed = decay * (self._speed - stiffness * pull * dt_s)
         if np.abs(self.gap).max() < CLOSED:
-            self.gap, self._open = np.zeros_like(self.gap), False
+            self.gap, self._speed, self._open = np.zeros_like(self.gap), np.zeros_like(self.gap), False
         return self.gap
 
 
@@ -77,17 +81,26 @@ class Presence:
         self._fingers, self._wrist = Ease(len(rest_angles)), Ease(6)
         self._finger_source: Hashable = None
         self._wrist_source: Hashable = None
+        self._guessed = False
         self.shown: Shown | None = None
 
     def show(
-        self, state: State, angles: Array | None, wrist: Array | None, run: int, held: Hashable, dt_s: float
+        self,
+        state: State,
+        angles: Array | None,
+        wrist: Array | None,
+        run: int,
+        held: Hashable,
+        dt_s: float,
+        known: bool = True,
     ) -> Shown | None:
         """The hand at the next tick, `dt_s` after the last one.
 
         `angles (20,)` is the synthesised pose of a live hand; without it the fingers are held, or ease to rest.
-        `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays. When the `run` of the
-        stream or the object `held` changes, and when the wrist is somewhere else at once, the hand glides from what
-        it showed. None before a wrist was seen.
+        `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays; `known` is False where it
+        had to be guessed, because nothing newer has arrived. When the `run` of the stream or the object `held`
+        changes, after a guess, and when the wrist is somewhere else at once, the hand glides from what it showed.
+        None before a wrist was seen.
         Raises `NotFiniteError` and changes nothing.
         """
         self._guard.check(angles, wrist)
@@ -100,6 +113,7 @@ class Presence:
         else:
             fingers = self._next_angles(self.shown.angles, state, angles, source, dt_s)
             self.shown = Shown(state, fingers, self._next_wrist(self.shown.wrist, wrist, run, dt_s))
+        self._guessed = not known
         return self.shown
 
     def _next_angles(self, shown: Array, state: State, angles: Array | None, source: Hashable, dt_s: float) -> Array:
@@ -120,6 +134,8 @@ class Presence:
         if self._wrist_source != source:
             self._wrist_source = source
             self._wrist.open(_gap(shown, wrist))
+        elif self._guessed:
+            self._wrist.change(_gap(shown, wrist))
         wanted = _beside(wrist, self._wrist.close(dt_s, RETURN_HALF_LIFE_S))
         if self._guard.is_reachable(*_apart(shown.tolist(), wanted.tolist()), dt_s):
             return wanted

@@ -59,12 +59,14 @@ _CLOCK: Final = ""
 class BodyAtTick:
     """One body as one tick sees it: `window (21, 7)` around it, `pose (7,)` at it, world frame.
 
-    `age_s` is the time from its newest tracked sample to the tick.
+    `age_s` is the time from its newest tracked sample to the tick. The pose is `known` when it lies between samples,
+    not beyond the newest.
     """
 
     window: Array
     pose: Array
     age_s: float
+    known: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,8 +307,8 @@ class Timeline:
             forecast = None if silent else self._forecast
             poses, ages = sample(list(tracks.values()), instants, time_s, due_s, forecast)
             bodies = {
-                key: BodyAtTick(rows, rows[PRESENT], age_s)
-                for key, rows, age_s in zip(tracks, poses, ages, strict=True)
+                key: BodyAtTick(rows, rows[PRESENT], age_s, bool(time_s <= track.times[-1] + TIME_TOLERANCE_S))
+                for (key, track), rows, age_s in zip(tracks.items(), poses, ages, strict=True)
             }
         waited_for_s = min(run.completed_s(due_s), now_s)
         return Tick(run.number, index, time_s, self._effective_s, waited_for_s, silent, bodies)
