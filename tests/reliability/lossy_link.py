@@ -119,12 +119,14 @@ def _live(message: HandsMessage) -> bool:
 
 def main() -> None:
     options = parser(__doc__, 15.0)
+    options.add_argument("--way", action="append", choices=WAYS, help="only this; repeatable")
+    options.add_argument("--look-ahead", action="append", type=float, metavar="SECONDS", help="only this; repeatable")
     options.add_argument("--holes", type=int, default=5, help="blackholes for each way (default: %(default)s)")
     arguments = options.parse_args()
     performance = motion(RATE_HZ)
     meshes = [f"--mesh={name}={path}" for name, path in performance.meshes.items()]
     rows = []
-    for way, look_ahead_s in itertools.product(WAYS, LOOK_AHEADS_S):
+    for way, look_ahead_s in itertools.product(arguments.way or WAYS, arguments.look_ahead or LOOK_AHEADS_S):
         options = (*meshes, "--look-ahead", str(look_ahead_s))
         outcomes = {}
         for weather in (CLEAN, *WEATHERS):

@@ -1,8 +1,9 @@
 """Clients with the wrong keys at each ZeroMQ socket of a server with keys, while a listed pair performs.
 
 Six kinds: a listed key but another server's public key; no key; ZeroMQ's user name and password instead (PLAIN); a good
-key that is on no list; and TCP clients that speak no ZeroMQ, one that is silent and one that speaks HTTP. Each watches hands, sends bodies and asks, for some seconds; nothing may reach it or be taken of
-it, each refusal must be counted, and the listed pair must miss no message.
+key that is on no list; and TCP clients that speak no ZeroMQ, one that is silent and one that speaks HTTP. Each watches
+hands, sends bodies and asks; nothing may reach it or be taken of it, each refusal must be counted, and the listed pair
+must miss no message.
 """
 
 import socket
