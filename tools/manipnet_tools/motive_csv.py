@@ -49,7 +49,8 @@ def read_motive_csv(path: Path) -> MotiveCsv:
         with path.open(newline="", encoding="utf-8-sig") as file:
             lines = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise MotiveCsvError(f"{path}: cannot be read ({error})") from None
+        remedy = "; save it as UTF-8" if isinstance(error, UnicodeDecodeError) else ""
+        raise MotiveCsvError(f"{path}: cannot be read ({error}){remedy}") from None
     try:
         return _parse(lines)
     except MotiveCsvError as error:
