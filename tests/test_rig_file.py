@@ -21,7 +21,7 @@ from manipnet.config import (
 from manipnet.geometry import quat_exp
 from manipnet.hand.skeleton import DOF_NAMES
 from manipnet.objects.library import library_file
-from manipnet.rig import load_rig
+from manipnet.rig import SERVER_KEYS, load_rig
 from manipnet.rig_file import rig_text, store
 
 # --- printed and read
@@ -99,6 +99,11 @@ def same(a: ServerConfig, b: ServerConfig) -> None:
 @given(config=configs())
 def test_a_configuration_that_is_printed_reads_back_as_the_same(config: ServerConfig, tmp_path_factory) -> None:
     same(config, read_back(tmp_path_factory.getbasetemp(), rig_text(config)))
+
+
+def test_whatever_a_server_can_be_told_a_rig_can_say() -> None:
+    said = {"look_ahead_s" if key == "look_ahead" else key for key in SERVER_KEYS}
+    assert {field.name for field in fields(ServerConfig)} - {"actors", "rig"} == said
 
 
 def test_the_effective_configuration_is_printed_and_served_as_it_is(tmp_path: Path, capsys) -> None:

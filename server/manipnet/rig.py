@@ -44,13 +44,14 @@ SERVER_KEYS: Mapping[str, tuple[type, ...]] = {
     "allow": (list,),
     "insecure": (bool,),
     "demo": (bool,),
+    "takes": (str,),
     "dump_dir": (str,),
 }
 """What the table `[server]` may hold: the command line's options of these names, which win over it."""
 
 _KINDS = {str: "text", int: "an integer", float: "a number", bool: "true or false", list: "a list of text"}
 _ACTOR_KEYS = ("bodies", "objects", "hand_scale", "limits_deg")
-_FOLDERS = ("keys", "objects", "dump_dir")
+_FOLDERS = ("keys", "objects", "takes", "dump_dir")
 """Keys of `[server]` that name folders, as the rig file sees them."""
 _NOBODY_ELSE = "[bodies]\nleft_wrist = 'left_wrist'\nright_wrist = 'right_wrist'\n"
 """Who is expected when no file says otherwise."""
