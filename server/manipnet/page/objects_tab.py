@@ -29,10 +29,13 @@ class ObjectsTab:
         self._scale = gui.add_slider("Size", 0.2, 3.0, 0.05, initial_value=1.0)
         self._position = gui.add_vector3("Moved, mm", (0.0, 0.0, 0.0), step=1.0)
         self._turn = gui.add_vector3("Turned, °", (0.0, 0.0, 0.0), step=1.0)
+        self._stand = gui.add_button("It stands on the sheet", icon=viser.Icon.ARROW_BAR_TO_DOWN)
         self._unit = gui.add_dropdown("Unit of a file", tuple(UNITS_M), initial_value="m")
         self._upload = gui.add_upload_button(
             "Bring in a mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
         )
+        self._problems = gui.add_markdown("")
+        self._stand.on_click(lambda _: self._doing(self._stand_on_sheet))
         self._body.on_update(self._by_visitor(self._show_body))
         for handle in (self._object, self._scale):
             handle.on_update(self._by_visitor(lambda: self._doing(self._select)))
@@ -51,6 +54,7 @@ class ObjectsTab:
         objects = tuple(answer["objects"])
         if self._object.options != objects:
             self._object.options = objects
+        self._problems.content = "\n".join(f"⚠ {text}\n" for text in answer.get("problems", {}).values())
         bodies = tuple(self._carried) or NONES
         if self._body.options != bodies:
             self._body.options = bodies
@@ -80,6 +84,9 @@ class ObjectsTab:
         rotation = quat_exp(np.radians(self._turn.value)).tolist()
         position = [1e-3 * x for x in self._position.value]
         self._page.link.ask(op="place_object", position=position, rotation=rotation, **self._chosen())
+
+    def _stand_on_sheet(self) -> None:
+        self._page.link.ask(op="place_object", on_sheet=True, **self._chosen())
 
     def _bring_in(self) -> str:
         file = self._upload.value

@@ -17,14 +17,17 @@ if TYPE_CHECKING:
 
 DOTS = {"live": "🟢", "hold": "🟡", "rest": "⚪"}
 NOTE_S = 6.0
+SHEET = """Lay both hands flat on the calibration sheet (`docs/calibration.md`), wrists on its marks, and keep still
+for 2 s. Then, for the size of the hands, touch its centre line with the fingertips."""
 
 
 class Panel:
     """Built when a visitor comes. An operator sits on this machine; others only look."""
 
     def __init__(self, page: "Page", client: viser.ClientHandle, operator: bool) -> None:
-        self._page, self._client, self._operator = page, client, operator
-        self._tabs: list[ObjectsTab | TakesTab] = []
+        self._page, self._client = page, client
+        self.objects: ObjectsTab | None = None
+        self._takes: TakesTab | None = None
         self._paused = False
         gui = client.gui
         gui.main_panel.dock_right()
@@ -35,9 +38,11 @@ class Panel:
             with tabs.add_tab("Scene", viser.Icon.STACK_2):
                 self._scene(gui)
             with tabs.add_tab("Objects", viser.Icon.CUBE):
-                self._tabs.append(ObjectsTab(page, gui, self.doing))
+                self.objects = ObjectsTab(page, gui, self.doing)
             with tabs.add_tab("Takes", viser.Icon.MOVIE):
-                self._tabs.append(TakesTab(page, gui, self.doing))
+                self._takes = TakesTab(page, gui, self.doing)
+            with tabs.add_tab("Calibrate", viser.Icon.RULER_MEASURE):
+                self._calibration(gui)
         side = gui.add_panel()
         with side.add_tab("Health", viser.Icon.HEARTBEAT):
             self._health = gui.add_markdown("")
@@ -55,10 +60,10 @@ class Panel:
         self._headline.content = _headline(self._page, status, history)
         self._health.content = _health(status)
         self._plots.show(history)
-        if self._operator:
+        if self.objects is not None and self._takes is not None:
             self._show_paused(status)
-            for tab in self._tabs:
-                tab.refresh()
+            self.objects.refresh()
+            self._takes.refresh()
 
     def doing(self, action: Callable[[], str | None]) -> None:
         """Do what the visitor asked for, and tell how it went where there is anything to tell."""
@@ -73,10 +78,15 @@ class Panel:
     def _controls(self, gui: viser.GuiApi) -> None:
         self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="hold the hands where they are")
         rest = gui.add_button("Rest", icon=viser.Icon.HAND_STOP, hint="ease the hands to their rest pose")
-        calibrate = gui.add_button("Calibrate", icon=viser.Icon.RULER_MEASURE, hint="hands flat on the sheet, 2 s")
         self._on_click(self._pause, self._toggle_pause)
         self._on_click(rest, self._ask(op="rest"))
-        self._on_click(calibrate, self._calibrate)
+
+    def _calibration(self, gui: viser.GuiApi) -> None:
+        gui.add_markdown(SHEET)
+        wrists = gui.add_button("Hands are on the marks", icon=viser.Icon.HAND_STOP)
+        tips = gui.add_button("Fingertips touch the line", icon=viser.Icon.HAND_FINGER)
+        self._on_click(wrists, lambda: self._calibrate("wrists"))
+        self._on_click(tips, lambda: self._calibrate("fingertips"))
 
     def _scene(self, gui: viser.GuiApi) -> None:
         slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
@@ -98,9 +108,10 @@ class Panel:
     def _toggle_pause(self) -> None:
         self._page.link.ask(op="pause", on=not self._paused)
 
-    def _calibrate(self) -> str:
-        answer = self._page.link.ask(op="calibrate")
-        return ", ".join(f"{key} {value}" for key, value in answer.items())
+    def _calibrate(self, step: str) -> str:
+        answer = self._page.link.ask(op="calibrate", step=step)
+        kept = f"kept in {answer['stored']}" if answer.get("stored") else answer.get("note", "")
+        return f"quality {answer['quality']}, hands {answer['hand_scale']:.3f} times the model's; {kept}"
 
     def _show_paused(self, status: dict[str, Any]) -> None:
         paused = any(actor.get("paused") for actor in status["actors"].values())

@@ -17,7 +17,7 @@ from manipnet.geometry import Array
 from manipnet.page.frames import Frame, ShapeView
 from manipnet.page.hands import HandModel
 from manipnet.page.layers import ActorLayers
-from manipnet.page.link import Link, LinkLog
+from manipnet.page.link import Link, LinkLog, RefusedError
 from manipnet.page.panel import Panel
 from manipnet.page.playback import Recording
 from manipnet.page.plots import History
@@ -38,7 +38,8 @@ def serve(listener: socket.socket, connection: Connection) -> None:
     link = Link(connection)
     logging.basicConfig(level=logging.WARNING, handlers=[LinkLog(link)], force=True)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # visitors that go away are no news
-    page = Page(open_server(listener, "ManipNet Live"), link)
+    page = Page(link)
+    page.open(open_server(listener, "ManipNet Live", page.dropped))
     threading.Thread(target=page.refresh, name="refresh", daemon=True).start()
     page.run()
     os._exit(0)  # browsers are still connected; nothing here is worth saving
@@ -69,7 +70,7 @@ class ActorView:
 class Page:
     """What is shown to everybody, and a panel for each visitor."""
 
-    def __init__(self, server: viser.ViserServer, link: Link) -> None:
+    def __init__(self, link: Link) -> None:
         self.link = link
         self.layers = {"contacts"}
         """Those of `layers.LAYERS` that are shown."""
@@ -79,13 +80,15 @@ class Page:
         """What is shown instead of what is live."""
         self.live: dict[str, Frame] = {}
         """The newest frame of each actor."""
-        self._server = server
-        self._stage = Stage(server.scene)
         self._shapes: dict[str, ShapeView] = {}
         self._views: dict[str, ActorView] = {}
         self._drawing = threading.Lock()
         self._drawn = 0
         self._panels: dict[int, Panel] = {}
+
+    def open(self, server: viser.ViserServer) -> None:
+        """Furnish the stage and let visitors in."""
+        self._server, self._stage = server, Stage(server.scene)
         server.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, brand_color=(88, 166, 255), control_width="medium"
         )
@@ -129,6 +132,16 @@ class Page:
     def recenter(self) -> None:
         """Put table and cameras where the hands are now."""
         self._drawn = 0
+
+    def dropped(self, name: str, content: bytes) -> str:
+        """Bring in a file that was dropped on the page; what became of it."""
+        panel = next((panel for panel in self._panels.values() if panel.objects is not None), None)
+        if panel is None or panel.objects is None:
+            return "nobody is here who may bring in files"
+        try:
+            return panel.objects.bring_in(name, content)
+        except (RefusedError, ValueError, OSError) as error:
+            return str(error)
 
     def refresh(self) -> None:
         """Bring the panels up to date, again and again."""
