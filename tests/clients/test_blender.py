@@ -62,7 +62,10 @@ def armature(bpy, rng):
             bones.append(bone)
     thing = bpy.types.Object("Rig", SimpleNamespace(bones=bones))
     thing.pose = SimpleNamespace(
-        bones={b.name: SimpleNamespace(rotation_quaternion=(1.0, 0, 0, 0), matrix=None) for b in bones}
+        bones={
+            b.name: SimpleNamespace(rotation_quaternion=(1.0, 0, 0, 0), location=(0.0, 0, 0), matrix=None)
+            for b in bones
+        }
     )
     return thing
 
@@ -133,7 +136,7 @@ def test_live_recorded_and_gone(blender):
     assert threading.active_count() == threads
     assert not blender.bpy.app.timers.registered
     curves = thing.animation_data.action.curves
-    assert len(curves) == 2 * 15 * 4
+    assert len(curves) == 2 * (16 * 4 + 3)  # fingers and wrists turn, wrists move
     assert thing.animation_data.action_slot == ("OBJECT", "Rig")
     assert frames > 5
     for curve in curves.values():
@@ -149,12 +152,14 @@ def test_actions_without_slots(blender):
     blender.bpy.action_type = blender.bpy.PlainAction
     recording = importlib.import_module("manipnet_live.recording")
     thing = armature(blender.bpy, np.random.default_rng(5))
-    taken = recording.Recording(thing, ["mixamorig:LeftHandIndex1"])
+    taken = recording.Recording(thing, ["mixamorig:LeftHandIndex1"], ["mixamorig:LeftHand"])
     for t in (0.0, 0.1, 0.1, 0.3):
-        taken.add(t, np.array([[np.cos(t), np.sin(t), 0.0, 0.0]]) * (-1 if t == 0.1 else 1))
+        turn = np.array([[np.cos(t), np.sin(t), 0.0, 0.0]]) * (-1 if t == 0.1 else 1)
+        taken.add(t, turn, np.array([[2 * t, 0.0, 1.0]]))
     assert taken.write(1, 10.0) == 4
-    w, x = (c.points[1::2] for c in list(thing.animation_data.action.fcurves.values())[:2])
+    w, x, _, _, px, _, pz = (c.points[1::2] for c in thing.animation_data.action.fcurves.values())
     np.testing.assert_allclose(np.arctan2(x, w), [0.0, 0.1, 0.2, 0.3], atol=2e-3)
+    np.testing.assert_allclose([px, pz], [[0.0, 0.2, 0.4, 0.6], [1.0] * 4], atol=1e-9)
 
 
 def test_empties_stand_where_the_joints_are(blender):
@@ -185,6 +190,28 @@ def test_a_wrong_address_is_reported(blender):
     assert operator.execute(SimpleNamespace(scene=SimpleNamespace(manipnet=chosen))) == {"CANCELLED"}
     assert "tcp://HOST:PORT" in reports[0][1]
     assert not blender.session.is_running
+
+
+def test_the_panel_tells_what_goes_on(blender):
+    panel, drawn = importlib.import_module("manipnet_live.panel"), []
+    layout = SimpleNamespace(
+        column=lambda: SimpleNamespace(prop=lambda _, name: drawn.append(name)),
+        operator=lambda name, **_: drawn.append(name),
+        label=lambda text, **_: drawn.append(text),
+    )
+    view = panel.MANIPNET_PT_panel()
+    view.layout = layout
+    context = SimpleNamespace(scene=SimpleNamespace(manipnet=None))
+    view.draw(context)
+    assert drawn == ["address", "actor", "delay", "armature", "follow_wrists", "manipnet.connect"]
+    with publishing() as (_, tcp, _):
+        blender.session.start(tcp, "", 0.05, None, False)
+        show_until(blender, lambda: blender.session.stats().rate_hz > 0)
+        view.draw(context)
+        blender.session.stop()
+    assert "connected" in drawn
+    assert " Hz, age " in drawn[-1]
+    assert drawn[-1].endswith(" lost")
 
 
 def test_manifest():

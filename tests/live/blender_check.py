@@ -67,18 +67,19 @@ def main():
     else:
         curves = action.fcurves
     keys = [len(curve.keyframe_points) for curve in curves]
-    assert len(keys) == 2 * 15 * 4, len(keys)
+    assert len(keys) == 2 * (16 * 4 + 3), len(keys)  # fingers and wrists turn, wrists move
     assert set(keys) == {frames}, (frames, set(keys))
     bone = thing.pose.bones["LeftHandIndex1"]
-    seen = set()
+    seen, places = set(), set()
     for frame in range(1, frames + 1):
         bpy.context.scene.frame_set(frame)
         assert math.isclose(bone.rotation_quaternion.magnitude, 1.0, abs_tol=1e-3)
         seen.add(tuple(round(x, 4) for x in bone.rotation_quaternion))
+        places.add(tuple(round(x, 4) for x in thing.pose.bones["LeftHand"].location))
     manipnet_live.unregister()
     print(
         f"Blender {bpy.app.version_string}: {stats.received} frames received, {stats.lost} lost, "
-        f"{frames} frames keyed on {len(keys)} curves, {len(seen)} different poses of one bone"
+        f"{frames} frames keyed on {len(keys)} curves, {len(seen)} different poses of a bone, {len(places)} of a wrist"
     )
 
 

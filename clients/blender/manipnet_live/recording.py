@@ -5,47 +5,61 @@ import numpy as np
 
 
 class Recording:
-    """Rotations of bones over time. `add` is cheap; `write` makes all keys at once, one per scene frame."""
+    """Bones over time: rotations of all, locations of those `moved`.
 
-    def __init__(self, armature: bpy.types.Object, bone_names: list[str]) -> None:
-        self._armature, self._bone_names = armature, bone_names
+    `add` is cheap; `write` makes all keys at once, one per scene frame.
+    """
+
+    def __init__(self, armature: bpy.types.Object, bone_names: list[str], moved: list[str]) -> None:
+        self._armature, self._bone_names, self._moved = armature, bone_names, moved
         self._times: list[float] = []
         self._rotations: list[np.ndarray] = []
+        self._locations: list[np.ndarray] = []
 
     def __len__(self) -> int:
         return len(self._times)
 
-    def add(self, time_s: float, rotations: np.ndarray) -> None:
-        """One instant: `rotations (bones, 4)` wxyz. Instants that do not rise are left out."""
+    def add(self, time_s: float, rotations: np.ndarray, locations: np.ndarray) -> None:
+        """One instant: `rotations (bones, 4)` wxyz, `locations (moved, 3)`. Instants that do not rise are left out."""
         if not self._times or time_s > self._times[-1]:
             self._times.append(time_s)
             self._rotations.append(rotations)
+            self._locations.append(locations)
 
     def write(self, first_frame: int, fps: float) -> int:
         """Make an action of it on the armature, from `first_frame` on; returns the number of frames."""
         if len(self._times) < 2:
             return 0
-        frames, rotations = self._resampled(fps)
+        times = np.array(self._times) - self._times[0]
+        frames = np.arange(int(times[-1] * fps) + 1)
         curves = _new_curves(self._armature)
-        for i, name in enumerate(self._bone_names):
-            path = f'pose.bones["{bpy.utils.escape_identifier(name)}"].rotation_quaternion'
-            for channel in range(4):
-                _fill(curves.new(path, index=channel), first_frame + frames, rotations[:, i, channel])
-            self._armature.pose.bones[name].rotation_mode = "QUATERNION"
+        for names, what, values in (
+            (self._bone_names, "rotation_quaternion", self._turns(times, frames / fps)),
+            (self._moved, "location", _resampled(np.array(self._locations), times, frames / fps)),
+        ):
+            for i, name in enumerate(names):
+                path = f'pose.bones["{bpy.utils.escape_identifier(name)}"].{what}'
+                for channel in range(values.shape[-1]):
+                    _fill(curves.new(path, index=channel), first_frame + frames, values[:, i, channel])
+                self._armature.pose.bones[name].rotation_mode = "QUATERNION"
         return len(frames)
 
-    def _resampled(self, fps: float) -> tuple[np.ndarray, np.ndarray]:
-        """Whole frames `(T,)` and the rotations at them `(T, bones, 4)`."""
-        times = np.array(self._times) - self._times[0]
+    def _turns(self, times: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """The rotations at other times, `(T, bones, 4)`."""
         rotations = np.array(self._rotations)
         dots = np.sum(rotations[1:] * rotations[:-1], axis=-1)
         signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)
         rotations[1:] *= signs[..., None]
-        frames = np.arange(int(times[-1] * fps) + 1)
-        flat = rotations.reshape(len(times), -1)
-        out = np.stack([np.interp(frames / fps, times, column) for column in flat.T], axis=-1)
-        out = out.reshape(len(frames), -1, 4)
-        return frames, out / np.linalg.norm(out, axis=-1, keepdims=True)
+        out = _resampled(rotations, times, at)
+        return out / np.linalg.norm(out, axis=-1, keepdims=True)
+
+
+def _resampled(values: np.ndarray, times: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values `(N, bones, channels)` at `times`, linearly at other times."""
+    out = np.empty((len(at), *values.shape[1:]))
+    for place in np.ndindex(values.shape[1:]):
+        out[(slice(None), *place)] = np.interp(at, times, values[(slice(None), *place)])
+    return out
 
 
 def _new_curves(armature: bpy.types.Object):

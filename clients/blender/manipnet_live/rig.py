@@ -32,6 +32,7 @@ class ArmatureHand:
             raise RigError(f"{armature.name} has no bone for {', '.join(missing)} of the {side} hand")
         self.bone_names = [str(name) for name in names]
         self.hand_name = str(hand)
+        self.moved = [self.hand_name] if follow_wrist else []
         self._bind(bones)
 
     def _bind(self, bones: dict) -> None:
@@ -61,6 +62,13 @@ class ArmatureHand:
                 basis[i] = multiply(conjugate(self._rest[i]), multiply(carried, turned[i]))
         return basis[:, [3, 0, 1, 2]]
 
+    def keys(self, hand: Hand) -> tuple[np.ndarray, np.ndarray]:
+        """What keyframes of the pose shown hold: rotations wxyz of `bone_names` and `moved`, locations of `moved`."""
+        moved = [self._armature.pose.bones[name] for name in self.moved]
+        rotations = [np.array(bone.rotation_quaternion) for bone in moved]
+        locations = [np.array(bone.location) for bone in moved]
+        return np.vstack([self.solve(hand), *rotations]), np.array(locations).reshape(-1, 3)
+
     def show(self, hand: Hand, weight: float) -> None:
         """Pose the bones; `weight` below one mixes in the pose they have."""
         bones = self._armature.pose.bones
@@ -68,6 +76,7 @@ class ArmatureHand:
             place = mathutils.Vector(to_blender(hand.wrist)[:3])
             x, y, z, w = turned_to_blender(self._rig.hand_rotation(hand))
             world = mathutils.Matrix.LocRotScale(place, mathutils.Quaternion((w, x, y, z)), None)
+            bones[self.hand_name].rotation_mode = "QUATERNION"
             bones[self.hand_name].matrix = self._armature.matrix_world.inverted() @ world
         for name, basis in zip(self.bone_names, self.solve(hand), strict=True):
             bone = bones[name]

@@ -68,8 +68,9 @@ class Session:
     def start_recording(self) -> None:
         """Collect what is shown from now on."""
         if self._armature:
-            names = [name for hand in self._hands.values() for name in hand.bone_names]
-            self._recording = Recording(self._armature, names)
+            names = [name for hand in self._hands.values() for name in (*hand.bone_names, *hand.moved)]
+            moved = [name for hand in self._hands.values() for name in hand.moved]
+            self._recording = Recording(self._armature, names, moved)
 
     def stop_recording(self) -> int:
         """Write the keyframes, from the scene's current frame on; returns how many frames."""
@@ -90,8 +91,8 @@ class Session:
             for side, hand in present.items():
                 self._hands[side].show(hand, shown.weight)
             if self._recording is not None and len(present) == len(SIDES):
-                rotations = [self._hands[side].solve(present[side]) for side in SIDES]
-                self._recording.add(now_s, np.concatenate(rotations))
+                rotations, locations = zip(*(self._hands[side].keys(present[side]) for side in SIDES), strict=True)
+                self._recording.add(now_s, np.concatenate(rotations), np.concatenate(locations))
         if now_s - self._redrawn_s > REDRAW_EVERY_S:
             self._redrawn_s = now_s
             self._redraw()

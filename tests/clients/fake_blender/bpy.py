@@ -46,7 +46,7 @@ class Curve:
 
 class Curves(dict):
     def new(self, path, index):
-        assert re.fullmatch(r'pose\.bones\["[^"]+"\]\.rotation_quaternion', path)
+        assert re.fullmatch(r'pose\.bones\["[^"]+"\]\.(rotation_quaternion|location)', path)
         self[path, index] = Curve()
         return self[path, index]
 
