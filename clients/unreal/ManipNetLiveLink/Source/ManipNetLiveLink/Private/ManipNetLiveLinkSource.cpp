@@ -75,10 +75,11 @@ void FManipNetLiveLinkSource::PushHand(const manipnet::HandFrame& Hand, const TC
     {
         return;
     }
-    const FLiveLinkSubjectKey Key(SourceGuid, SubjectName(Side));
-    if (!Described.Contains(Key.SubjectName))
+    const FName Name = SubjectName(Side);
+    const FLiveLinkSubjectKey Key(SourceGuid, Name);
+    if (!Described.Contains(Name))
     {
-        Described.Add(Key.SubjectName);
+        Described.Add(Name);
         LiveLink->PushSubjectStaticData_AnyThread(Key, ULiveLinkAnimationRole::StaticClass(), DescribeHand());
     }
     FLiveLinkFrameDataStruct Data(FLiveLinkAnimationFrameData::StaticStruct());
@@ -100,10 +101,11 @@ void FManipNetLiveLinkSource::PushBody(const manipnet::BodyFrame& Body)
     {
         return;
     }
-    const FLiveLinkSubjectKey Key(SourceGuid, SubjectName(UTF8_TO_TCHAR(Body.BodyName.Text)));
-    if (!Described.Contains(Key.SubjectName))
+    const FName Name = SubjectName(UTF8_TO_TCHAR(Body.BodyName.Text));
+    const FLiveLinkSubjectKey Key(SourceGuid, Name);
+    if (!Described.Contains(Name))
     {
-        Described.Add(Key.SubjectName);
+        Described.Add(Name);
         FLiveLinkStaticDataStruct Static(FLiveLinkTransformStaticData::StaticStruct());
         LiveLink->PushSubjectStaticData_AnyThread(Key, ULiveLinkTransformRole::StaticClass(), MoveTemp(Static));
     }
