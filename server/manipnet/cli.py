@@ -95,6 +95,8 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until SIGINT or SIGTERM; the exit status: 0 after a clean stop, 1 for what cannot be served."""
     arguments = build_parser().parse_args(argv)
+    if arguments.print_config:
+        return _print_config(arguments)
     # The libraries behind these take a second to load: --help and a mistyped option should not.
     from manipnet.first_start import Helper
 
@@ -112,17 +114,24 @@ def main(argv: Sequence[str] | None = None) -> int:
     terminal = Terminal(as_json=arguments.log_format == "json")
     logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
     try:
-        config = configure(arguments)
-        if arguments.print_config:
-            print(describe(config), end="")
-            return 0
-        server = Server(config, terminal.say)
+        server = Server(configure(arguments), terminal.say)
         server.run(stop.is_set, helper.wait)
     except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
     finally:
         terminal.close()
+    return 0
+
+
+def _print_config(arguments: argparse.Namespace) -> int:
+    from manipnet.config import ConfigError
+
+    try:
+        print(describe(configure(arguments)), end="")
+    except ConfigError as error:
+        print(f"manipnet-serve: {error}", file=sys.stderr)
+        return 1
     return 0
 
 

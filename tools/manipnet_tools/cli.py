@@ -119,6 +119,17 @@ VERBS = {
             "--natnet 192.168.1.5            ask Motive there",
         ),
     ),
+    "rig": Verb("write a rig file from what is heard, or show a configuration", "manipnet_tools.rig"),
+    "calibrate": Verb(
+        "find where the wrists sit on their bodies, and the size of the hands",
+        "manipnet_tools.calibrate",
+        "CalibrateOptions",
+        (
+            "--hand-length 0.19                       sheet at the world's origin, beside a running server",
+            "--at 0.4 0.75 0 --yaw 90                 sheet on a table elsewhere",
+            "--reference Box --fingertips             sheet under the tracked box; measure the hand length",
+        ),
+    ),
     "keys": Verb("make and list the keys that let clients in over the network", "manipnet.keys"),
 }
 
