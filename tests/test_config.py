@@ -18,6 +18,7 @@ from manipnet.config import (
     default_actor,
     is_loopback,
     parse_endpoint,
+    parse_network,
     parse_object,
 )
 from manipnet.objects.library import library_file
@@ -177,6 +178,12 @@ def test_what_makes_no_sense_is_refused(change: dict, complaint: str) -> None:
 
 def test_other_machines_are_let_in_only_when_asked_to() -> None:
     check(ServerConfig((default_actor(),), host="0.0.0.0", insecure=True))
+    keys, allow = Path("keys"), (parse_network("192.168.1.0/24"),)
+    check(ServerConfig((default_actor(),), host="0.0.0.0", keys=keys, allow=allow))
+    for only in ({"keys": keys}, {"allow": allow}):
+        for host in ("0.0.0.0", "::", "192.168.1.4", "stage"):
+            with pytest.raises(ConfigError, match="nothing would keep strangers out"):
+                check(ServerConfig((default_actor(),), host=host, **only))
     assert is_loopback("127.0.0.1")
     assert is_loopback("::1")
     assert is_loopback("localhost")

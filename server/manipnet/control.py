@@ -60,6 +60,7 @@ class Control:
             self._gatekeeper = Gatekeeper(self._context, rep, counters, keys)
             bind(rep, endpoint, "--control-port")
         except BaseException:
+            rep.close()
             self._context.term()
             raise
         self.address = rep.getsockopt_string(zmq.LAST_ENDPOINT)

@@ -106,8 +106,12 @@ class Publisher:
         pub.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
         pub.setsockopt(zmq.MAXMSGSIZE, 1024)  # subscriptions are all that comes in, and CURVE's handshake
         pub.setsockopt(zmq.IPV6, int(ipv6))
-        self._gatekeeper = Gatekeeper(self._context, pub, self._counters, self._keys)
-        bind(pub, endpoint, "--port")
+        try:
+            self._gatekeeper = Gatekeeper(self._context, pub, self._counters, self._keys)
+            bind(pub, endpoint, "--port")
+        except BaseException:
+            pub.close()
+            raise
         return pub
 
 
