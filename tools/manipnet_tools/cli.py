@@ -139,6 +139,8 @@ EXAMPLES = """examples:
   manipnet replay takes/mug1 --to tcp://127.0.0.1:5556 --loop
   manipnet record --out take.mcap
   manipnet synthesize takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz
+  manipnet batch takes --mesh mug1=meshes/mug1.obj --out fingers
+  manipnet export fingers.npz --format gltf --out fingers.glb
   manipnet evaluate --data DATASET --protocol seen
   manipnet train --data DATASET --out models/mine
   manipnet doctor --rig stage.toml"""
