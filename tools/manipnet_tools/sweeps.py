@@ -160,7 +160,7 @@ def _loop(
     frames = int(LOOP_S * metrics.RATE_HZ)
     at = np.resize([*range(len(case)), *reversed(range(len(case)))], frames)
     forth = np.resize([True] * len(case) + [False] * len(case), frames)
-    inputs = [_to_and_fro(seen, at, forth) for seen in case.inputs.values()]
+    inputs = [to_and_fro(seen, at, forth) for seen in case.inputs.values()]
     motions = roll_out(Synthesizer(bundle, solver), inputs, advance)
     for start in range(0, frames - len(case), there_and_back):
         positions = [motion.positions[start : start + len(case)] for motion in motions]
@@ -168,8 +168,16 @@ def _loop(
         yield f"from {start / metrics.RATE_HZ:.0f} s", average(score(case, mean, hands).values())
 
 
-def _to_and_fro(seen: HandInput, at: np.ndarray, forth: np.ndarray) -> HandInput:
+def to_and_fro(seen: HandInput, at: np.ndarray, forth: np.ndarray) -> HandInput:
+    """The ticks `at (n,)` of an input; where not `forth (n,)`, time runs backwards."""
+
     def play(windows: Array) -> Array:
         return np.where(forth[:, None, None], windows[at], windows[at, ::-1])
 
-    return replace(seen, wrist=play(seen.wrist), other_wrist=play(seen.other_wrist), object=play(seen.object))
+    return replace(
+        seen,
+        wrist=play(seen.wrist),
+        other_wrist=play(seen.other_wrist),
+        object=play(seen.object),
+        held=seen.held[at],
+    )
