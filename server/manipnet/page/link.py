@@ -40,10 +40,6 @@ class Link:
                 else:
                     yield what, content
 
-    def waiting(self) -> bool:
-        """Whether more has come than was taken."""
-        return self._connection.poll(0)
-
     def ask(self, **request: Any) -> dict[str, Any]:
         """One control request, as in docs/protocol.md, and its answer. Raises `RefusedError`."""
         number, answer = next(self._numbers), Future()

@@ -72,7 +72,7 @@ class Page:
 
     def __init__(self, link: Link) -> None:
         self.link = link
-        self.layers = {"contacts"}
+        self.layers: set[str] = set()
         """Those of `layers.LAYERS` that are shown."""
         self.histories: dict[str, History] = {}
         """By actor."""
@@ -82,7 +82,7 @@ class Page:
         """The newest frame of each actor."""
         self._shapes: dict[str, ShapeView] = {}
         self._views: dict[str, ActorView] = {}
-        self._drawing = threading.Lock()
+        self._drawing, self._news = threading.Lock(), threading.Event()
         self._drawn = 0
         self._panels: dict[int, Panel] = {}
 
@@ -96,7 +96,8 @@ class Page:
         server.on_client_disconnect(self._left)
 
     def run(self) -> None:
-        """Show what comes until the server ends."""
+        """Take what comes until the server ends. Nothing here takes long: answers come the same way."""
+        threading.Thread(target=self._draw, name="draw", daemon=True).start()
         for what, content in self.link.incoming():
             if what == "shape":
                 self._shapes[content.content_hash] = content
@@ -104,8 +105,7 @@ class Page:
                 actor = content.message.actor
                 self.live[actor] = content
                 self.histories.setdefault(actor, History()).note(content.message)
-                if self.recording is None and not self.link.waiting():
-                    self.show(content)
+                self._news.set()
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView] | None = None) -> None:
         """Draw one tick."""
@@ -153,6 +153,16 @@ class Page:
                 except Exception:  # a visitor who just left, or a fault of ours: the others want to see something
                     logging.getLogger(__name__).exception("a panel cannot be refreshed")
             time.sleep(max(REFRESH_S - (time.monotonic() - begin_s), 0.1))
+
+    def _draw(self) -> None:
+        """Draw the newest tick of every actor, as fast as they come or as they can be drawn."""
+        while self._news.wait():
+            self._news.clear()
+            for frame in list(self.live.values()) if self.recording is None else ():
+                try:
+                    self.show(frame)
+                except Exception:  # one tick is not drawn
+                    logging.getLogger(__name__).exception("a tick cannot be drawn")
 
     def _settle(self, frame: Frame, shapes: dict[str, ShapeView]) -> None:
         """Keep the table below everything; at first, and when asked, put it where things are."""
