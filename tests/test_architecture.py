@@ -95,6 +95,16 @@ def test_compiled_code_is_where_the_cache_looks_for_changes(path: Path) -> None:
         assert used - {"kernels"} | {part(path)} <= parts
 
 
+@pytest.mark.parametrize("path", [*modules(SERVER), *modules(TOOLS)], ids=lambda path: path.name)
+def test_nothing_that_runs_code_is_read_from_a_wire_or_file(path: Path) -> None:
+    roots = {name.split(".")[0] for name in imported(path)}
+    assert not roots & {"pickle", "shelve", "marshal", "dill", "cloudpickle", "joblib"}
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.load", "numpy.load", "torch.load"):
+            safe = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
+            assert safe.get("allow_pickle") == "False" or safe.get("weights_only") == "True", ast.unparse(node)
+
+
 def test_tools_are_a_package_of_their_own() -> None:
     for path in modules(TOOLS):
         for name in imported(path):
