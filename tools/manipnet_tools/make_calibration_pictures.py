@@ -1,74 +1,99 @@
-"""Pictures of docs/calibration.md, and the printable sheet: `python -m manipnet_tools.make_calibration_pictures`."""
+"""Picture of docs/calibration.md, and the printable sheet: `python -m manipnet_tools.make_calibration_pictures`."""
 
-import math
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from manipnet.calibration import HAND_LENGTH_M, MARK_M, wrist_on_sheet
 from manipnet.geometry import Array, mirror_points, transform
 from manipnet.hand.kinematics import forward_kinematics
-from manipnet.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
-from manipnet.hand.surface import FACES, skin
+from manipnet.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M
 from manipnet.synthesis import Side
-from manipnet_tools.render import SKIN_LEFT, SKIN_RIGHT, Camera, Solid, beads, contact_sheet, render, rods, save_png
 
 IMAGES: Final = Path(__file__).parents[2] / "docs" / "images"
-INK, RED, BLUE = (0.10, 0.10, 0.12), (0.75, 0.12, 0.10), (0.10, 0.25, 0.70)
 PAPER: Final = (0.42, 0.297)
-"""A3, metres."""
-SIZE: Final = (760, 560)
+"""A3, landscape, metres."""
+TABLE_M: Final = 0.56
+"""Edge of the square seen in the picture."""
+PIXELS: Final = 520
+FINE: Final = 3
+INK, GREY, RED, GREEN, BLUE = (25, 25, 30), (140, 140, 145), (190, 40, 30), (30, 130, 50), (30, 70, 190)
+SKINS: Final[dict[Side, tuple[int, int, int]]] = {"left": (214, 170, 150), "right": (228, 184, 158)}
 
 
 def main() -> None:
-    """Write all of them."""
-    flat, back = np.zeros(7), np.array([0.0, 0.0, HAND_LENGTH_M - MARK_M[1], 0.0, 0.0, 0.0, 0.0])
-    above = Camera.orbit(np.array([0.0, 0.02, 0.03]), 1.15, 0.0, math.radians(62))
-    views = [render([*_sheet(), *_hands(flat)], above, SIZE, floor_y=-0.004)]
-    views.append(render([*_sheet(), *_hands(back)], above, SIZE, floor_y=-0.004))
-    save_png(contact_sheet(views, 2), IMAGES / "calibration.png")
+    """Write both."""
+    from PIL import Image
+
+    panels = [panel(np.zeros(7), "1  wrists on the marks"), panel(_drawn_back(), "2  fingertips on the centre line")]
+    both = Image.new("RGB", (2 * PIXELS + 20, PIXELS), "white")
+    for i, image in enumerate(panels):
+        both.paste(image, (i * (PIXELS + 20), 0))
+    both.save(IMAGES / "calibration.png")
     (IMAGES / "calibration-sheet.svg").write_text(sheet_svg(), encoding="utf-8")
 
 
-def _hands(moved: Array) -> list[Solid]:
-    """Both hands flat, thumbs beside the palm, with a cluster of three markers each."""
-    angles = np.zeros(20)
-    angles[DOF_NAMES.index("THUMB_CMC_FE")] = DOF_LIMITS_RAD[0, 0]
-    positions, rotations = forward_kinematics(angles)
-    vertices = skin(positions, rotations)
-    cluster = np.array([[-0.02, 0.025, 0.045], [-0.02, -0.025, 0.045], [0.03, 0.0, 0.055]])
-    solids: list[Solid] = []
-    sides: tuple[Side, Side] = ("left", "right")
-    for side in sides:
-        wrist = wrist_on_sheet(side) + moved
-        here, faces, balls = vertices, FACES, cluster
-        if side == "left":
-            here, faces, balls = mirror_points(vertices), FACES[:, ::-1], mirror_points(cluster)
-        color = SKIN_LEFT if side == "left" else SKIN_RIGHT
-        solids.append(Solid(transform(wrist, here), faces, color))
-        markers = transform(wrist, balls)
-        solids.append(beads(markers, 0.007, (0.85, 0.85, 0.88)))
-        solids.append(rods(markers, np.roll(markers, 1, axis=0), 0.002, INK))
-    return solids
+def panel(moved: Array, title: str) -> Any:
+    """The sheet with both hands `moved` from their marks, from above, the operator at the bottom edge."""
+    from PIL import Image, ImageDraw, ImageFont
 
-
-def _sheet() -> list[Solid]:
-    """The paper, its lines and marks, and the world's axes at its centre."""
+    image = Image.new("RGB", (FINE * PIXELS, FINE * PIXELS), (176, 150, 122))
+    draw = ImageDraw.Draw(image)
+    font = ImageFont.load_default(FINE * 15)
     half_x, half_z = PAPER[0] / 2, PAPER[1] / 2
-    corners = np.array([(-half_x, 0, -half_z), (half_x, 0, -half_z), (half_x, 0, half_z), (-half_x, 0, half_z)])
-    x, z = MARK_M
-    ends = [((-half_x, 0), (half_x, 0))]
-    ends += [((side * x, -half_z), (side * x, half_z)) for side in (-1, 1)]
-    ends += [((side * x - 0.04, z), (side * x + 0.04, z)) for side in (-1, 1)]
-    lines = np.array([[(a[0], 0.0, a[1]), (b[0], 0.0, b[1])] for a, b in ends])
-    axes = np.array([[0.06, 0, 0], [0, 0.06, 0], [0, 0, 0.06]])
-    origin = np.zeros((1, 3))
-    return [
-        Solid(corners, np.array([(0, 2, 1), (0, 3, 2)]), (0.93, 0.93, 0.90)),
-        rods(lines[:, 0], lines[:, 1], 0.0012, INK),
-        *(rods(origin, axes[i : i + 1], 0.003, color) for i, color in enumerate((RED, (0.1, 0.5, 0.15), BLUE))),
-    ]
+    draw.rectangle([*_pixel(-half_x, -half_z), *_pixel(half_x, half_z)], fill=(248, 248, 244))
+    mark_x, mark_z = MARK_M
+    for a, b in [((-half_x, 0), (half_x, 0)), *(((s * mark_x, -half_z), (s * mark_x, half_z)) for s in (-1, 1))]:
+        draw.line([*_pixel(*a), *_pixel(*b)], fill=GREY, width=FINE)
+    for side in SKINS:
+        _draw_hand(draw, side, moved)
+    for s in (-1, 1):
+        draw.line([*_pixel(s * mark_x - 0.03, mark_z), *_pixel(s * mark_x + 0.03, mark_z)], fill=INK, width=2 * FINE)
+        x, y = _pixel(s * mark_x, mark_z)
+        draw.ellipse([x - 5 * FINE, y - 5 * FINE, x + 5 * FINE, y + 5 * FINE], outline=INK, width=2 * FINE)
+    for end, color, name in (((0.05, 0.0), RED, "x"), ((0.0, 0.05), BLUE, "z")):
+        draw.line([*_pixel(0.0, 0.0), *_pixel(*end)], fill=color, width=3 * FINE)
+        draw.text(_pixel(end[0] + 0.006, end[1] - 0.006), name, fill=color, font=font)
+    x, y = _pixel(0.0, 0.0)
+    draw.ellipse([x - 4 * FINE, y - 4 * FINE, x + 4 * FINE, y + 4 * FINE], fill=GREEN)
+    draw.text(_pixel(-0.026, -0.022), "y up", fill=GREEN, font=font)
+    draw.text(_pixel(-0.268, -0.272), title, fill=(255, 255, 255), font=font)
+    return image.resize((PIXELS, PIXELS), Image.Resampling.LANCZOS)
+
+
+def _drawn_back() -> Array:
+    return np.array([0.0, 0.0, HAND_LENGTH_M - MARK_M[1], 0.0, 0.0, 0.0, 0.0])
+
+
+def _draw_hand(draw: Any, side: Side, moved: Array) -> None:
+    """A flat hand as its capsules, and the marker cluster on its back."""
+    positions, _ = forward_kinematics(np.zeros(20))
+    cluster = np.array([[-0.035, 0.02, 0.03], [-0.035, -0.02, 0.03], [0.0, 0.0, 0.03]])
+    if side == "left":
+        positions, cluster = mirror_points(positions), mirror_points(cluster)
+    wrist = wrist_on_sheet(side) + moved
+    joints, markers = transform(wrist, positions), transform(wrist, cluster)
+    for grow_m, color in ((0.0012, INK), (0.0, SKINS[side])):  # the outline is a larger hand behind
+        for (start, end), radius in zip(CAPSULE_JOINTS, CAPSULE_RADII_M, strict=True):
+            _capsule(draw, joints[start], joints[end], radius + grow_m, color)
+    for a, b in zip(markers, np.roll(markers, 1, axis=0), strict=True):
+        _capsule(draw, a, b, 0.0015, INK)
+    for marker in markers:
+        _capsule(draw, marker, marker, 0.006, (205, 205, 212))
+
+
+def _capsule(draw: Any, start: Array, end: Array, radius: float, color: tuple[int, int, int]) -> None:
+    size = radius / TABLE_M * FINE * PIXELS
+    ends = [_pixel(start[0], start[2]), _pixel(end[0], end[2])]
+    draw.line([*ends[0], *ends[1]], fill=color, width=max(round(2 * size), 1))
+    for x, y in ends:
+        draw.ellipse([x - size, y - size, x + size, y + size], fill=color)
+
+
+def _pixel(x: float, z: float) -> tuple[float, float]:
+    scale = FINE * PIXELS / TABLE_M
+    return (x + TABLE_M / 2) * scale, (z + TABLE_M / 2) * scale
 
 
 def sheet_svg() -> str:
@@ -77,10 +102,10 @@ def sheet_svg() -> str:
     cx, cy, x, z = width / 2, height / 2, 1e3 * MARK_M[0], 1e3 * MARK_M[1]
     parts = [_line(0, cy, width, cy), _text(cx, cy - 3, "centre line (z = 0)"), _line(cx - 8, cy, cx + 8, cy, 1.2)]
     parts += [_line(cx, cy - 8, cx, cy + 8, 1.2), _line(cx, cy, cx + 40, cy, 1.0), _text(cx + 40, cy + 6, "+x")]
-    parts += [_line(cx, cy, cx, cy + 40, 1.0), _text(cx + 6, cy + 42, "+z, to the operator")]
+    parts += [_line(cx, cy, cx, cy + 40, 1.0), _text(cx + 6, cy + 46, "+z, to the operator")]
     for name, here in (("left", cx - x), ("right", cx + x)):
         parts += [_line(here, 0, here, height), _line(here - 40, cy + z, here + 40, cy + z, 1.0)]
-        parts += [f'<circle cx="{here}" cy="{cy + z}" r="4" fill="none" stroke="black"/>']
+        parts += [f'<circle cx="{here:g}" cy="{cy + z:g}" r="4" fill="none" stroke="black"/>']
         parts += [_text(here + 22, cy + z + 8, f"{name} wrist")]
         for centimetre in range(12, 24):
             at = cy + z - 10 * centimetre
