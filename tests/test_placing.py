@@ -80,7 +80,7 @@ def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(ca
 
 def test_a_hand_that_moved_changes_nothing(cast: Cast, rig: Path) -> None:
     show(cast, drift_m_s=0.01)
-    with pytest.raises(RequestError, match="left_wrist moved .* lay the hand down and try again"):
+    with pytest.raises(RequestError, match=r"left_wrist moved .* lay the hand down and try again"):
         Placing(cast, rig).handlers()["calibrate"]({"op": "calibrate"})
     assert rig.read_text(encoding="utf-8") == RIG
     assert np.array_equal(cast.actors[0].offset("left_wrist"), [0, 0, 0, 0, 0, 0, 1])
