@@ -9,6 +9,7 @@ import msgpack
 import pytest
 import zmq
 
+from manipnet.streams import gatekeeper
 from manipnet.streams.connections import MAX_UNDELIVERED_BYTES, SMALL_TALK_BYTES, Connections
 from manipnet.streams.gatekeeper import Gatekeeper
 from manipnet.streams.zmq_bodies import MAX_WIRE_BYTES, ZmqBodies
@@ -109,6 +110,19 @@ def test_one_too_many_is_turned_away_counted_and_let_in_when_there_is_room(door)
         assert [sub.recv() for sub in subs] == [b"news"] * MOST
         subs.pop().close()
         crowd.enter_context(subscribe(context, door))
+
+
+def test_who_does_not_speak_zeromq_is_counted_and_who_does_is_not(monkeypatch):
+    monkeypatch.setattr(gatekeeper, "HANDSHAKE_MS", 200)
+    door = Door()
+    with zmq.Context() as context, subscribe(context, door), knock(door.address) as browser:
+        browser.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        for _ in range(2_000):
+            if door.refused():
+                break
+            door.pub.poll(10)
+        assert door.refused() == {"handshake": 1}
+    door.close()
 
 
 @pytest.mark.skipif(not hasattr(socket, "TCP_INFO"), reason="only Linux tells how much came over a connection")

@@ -38,12 +38,13 @@ class Connections:
         """The socket is bound to `port`."""
         self._port = port
 
-    def opened(self, descriptor: int) -> None:
-        """A connection was accepted; one too many is cut off at once."""
+    def opened(self, descriptor: int) -> bool:
+        """A connection was accepted; one too many is cut off at once, which makes it False."""
         if len(self._received) >= self._most:
             self._cut(descriptor, "too_many")
-        else:
-            self._received[descriptor] = self._undelivered[descriptor] = 0
+            return False
+        self._received[descriptor] = self._undelivered[descriptor] = 0
+        return True
 
     def closed(self, descriptor: int) -> None:
         """A connection has ended."""

@@ -25,7 +25,9 @@ _REFUSED: Final = {
     "endless": "a client that sends frames without end and no message",
 }
 _FAILURES: Final = zmq.Event.HANDSHAKE_FAILED_PROTOCOL | zmq.Event.HANDSHAKE_FAILED_NO_DETAIL
-_EVENTS: Final = zmq.Event.LISTENING | zmq.Event.ACCEPTED | zmq.Event.DISCONNECTED | _FAILURES
+_EVENTS: Final = (
+    zmq.Event.LISTENING | zmq.Event.ACCEPTED | zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED | _FAILURES
+)
 _log = logging.getLogger(__name__)
 
 
@@ -48,6 +50,8 @@ class Gatekeeper:
         self._clients = None if keys is None else ClientList(keys)
         self.connections = Connections(most, self._refuse)
         self._logged_s: dict[str, float] = {}
+        self._shaking, self._accepted_s = 0, float("-inf")
+        """Connections whose handshake has come to no end that is known, and when the newest was accepted."""
         self._zap: zmq.Socket | None = None
         if keys is not None:
             secure_server(socket, keys)
@@ -79,6 +83,7 @@ class Gatekeeper:
                 if time.monotonic() - look_s >= 1e-3 * LOOK_MS:
                     look_s = time.monotonic()
                     self.connections.look()
+                    self._count_silent_failures(look_s)
         except zmq.ContextTerminated:
             pass
         finally:
@@ -89,18 +94,30 @@ class Gatekeeper:
         message = parse_monitor_message(parts)
         match message["event"]:
             case zmq.Event.ACCEPTED:
-                self.connections.opened(message["value"])
+                self._shaking += self.connections.opened(message["value"])
+                self._accepted_s = time.monotonic()
+            case zmq.Event.HANDSHAKE_SUCCEEDED:
+                self._shaking -= 1
             case zmq.Event.DISCONNECTED:
                 self.connections.closed(message["value"])
             case zmq.Event.LISTENING:
                 self.connections.listening(int(message["endpoint"].rpartition(b":")[2]))
-            case _:  # no key, a wrong server key, no CURVE, or no ZeroMQ at all
+            case _:  # no key, a wrong server key, no CURVE
+                self._shaking -= 1
                 self._refuse("handshake")
+
+    def _count_silent_failures(self, now_s: float) -> None:
+        """Count who does not speak ZeroMQ at all: there is no event of such, they only lack the one of success."""
+        if self._shaking and now_s - self._accepted_s > 2e-3 * HANDSHAKE_MS:
+            for _ in range(self._shaking):
+                self._refuse("handshake")
+            self._shaking = 0
 
     def _answer(self, zap: zmq.Socket, clients: ClientList) -> None:
         reply, listed = clients.answer(zap.recv_multipart())
         zap.send_multipart(reply)
         if not listed:
+            self._shaking -= 1
             self._refuse("not_listed")
 
     def _refuse(self, reason: str) -> None:
