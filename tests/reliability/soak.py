@@ -46,7 +46,7 @@ def soak(seconds: float) -> tuple[list[tuple[float, Usage]], dict, list[int]]:
                 thread.start()
             with playing(frames(performance, np.inf, ACTORS), zmq_sender(server.addresses["bodies"])):
                 samples = _sample(server, seconds)
-                status = server.ask({"op": "status"})
+                status = _status(server)
             stopping.set()
             for thread in threads:
                 thread.join()
@@ -64,6 +64,13 @@ def _sample(server: LiveServer, seconds: float) -> list[tuple[float, Usage]]:
         if k * SAMPLE_S % VISIT_S == VISIT_S / 2:
             _visit(server)
     return samples
+
+
+def _status(server: LiveServer) -> dict:
+    """The server's status, which on a very busy machine may take more than one question."""
+    while "counters" not in (status := server.ask({"op": "status"})):
+        print(status, file=sys.stderr)
+    return status
 
 
 def _visit(server: LiveServer) -> None:
