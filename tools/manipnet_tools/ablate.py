@@ -39,7 +39,7 @@ PROTOCOLS: tuple[Protocol, ...] = ("seen", "unseen")
 _SEEN_SHARE = 0.8
 
 
-TRAINING = TrainConfig(rounds=1, epochs_per_round=6, self_made=0.0, backwards=False, huber=0.0, average=0.99)
+TRAINING = TrainConfig(rounds=1, epochs_per_round=6, self_made=0.0, huber=0.0, average=0.99)
 """Shorter than a shipped bundle's: 49 models are to be trained."""
 
 

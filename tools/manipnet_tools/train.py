@@ -64,8 +64,8 @@ class TrainConfig:
     warp: float = 0.2
     captured: float = 0.3
     """Samples at captured poses, per captured frame and round."""
-    backwards: bool = True
-    """Learn every take played backwards as well: taking hold and letting go are each other's mirror images in time."""
+    backwards: bool = False
+    """Learn every take played backwards as well."""
     seed: int = 0
 
 
