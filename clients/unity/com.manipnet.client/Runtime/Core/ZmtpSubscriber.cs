@@ -64,10 +64,9 @@ namespace ManipNet.Client
             {
                 // under way
             }
-            int left = ConnectMs;
-            while (!Stop && left > 0 && !socket.Poll(1000 * SliceMs, SelectMode.SelectWrite)) left -= SliceMs;
+            bool open = Ready(socket, ConnectMs, SelectMode.SelectWrite);
             int result = (int)socket.GetSocketOption(SocketOptionLevel.Socket, SocketOptionName.Error);
-            if (Stop || left <= 0 || result != 0)
+            if (!open || result != 0)
             {
                 socket.Close();
                 throw new IOException("nobody answers at " + host + ":" + port);
@@ -130,7 +129,7 @@ namespace ManipNet.Client
                 _end -= _start;
                 _start = _resume = 0;
             }
-            if (!Readable(waitMs))
+            if (!Ready(_socket, waitMs, SelectMode.SelectRead))
             {
                 CheckAlive();
                 return;
@@ -141,10 +140,15 @@ namespace ManipNet.Client
             _heard = LocalClock.Now;
         }
 
-        bool Readable(int waitMs)
+        /// <summary>By the clock: on a busy machine a slice takes longer than it should.</summary>
+        bool Ready(Socket socket, int waitMs, SelectMode mode)
         {
-            for (int left = waitMs; left > 0 && !Stop; left -= SliceMs)
-                if (_socket.Poll(1000 * SliceMs, SelectMode.SelectRead)) return true;
+            double until = LocalClock.Now + 0.001 * waitMs;
+            while (!Stop)
+            {
+                if (socket.Poll(1000 * SliceMs, mode)) return true;
+                if (LocalClock.Now >= until) return false;
+            }
             return false;
         }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
+#include "LocalClock.h"
+
 #ifdef _WIN32
 #ifdef MANIPNET_UNREAL
 #include "Windows/AllowWindowsPlatformTypes.h"
@@ -122,11 +124,13 @@ long Socket::Receive(std::uint8_t* data, std::size_t capacity, int timeoutMs) {
 }
 
 bool Socket::Wait(bool toWrite, int timeoutMs) const {
-    for (int left = timeoutMs; left > 0 && !Stop; left -= kSliceMs) {
+    const double until = LocalNow() + 0.001 * timeoutMs;  // by the clock: on a busy machine a slice takes longer
+    while (!Stop) {
         PollItem one{};
         one.fd = static_cast<Native>(Handle);
         one.events = static_cast<short>(toWrite ? POLLOUT : POLLIN);
-        if (PollOne(&one, std::min(left, kSliceMs)) > 0) return true;
+        if (PollOne(&one, std::min(timeoutMs, kSliceMs)) > 0) return true;
+        if (LocalNow() >= until) return false;
     }
     return false;
 }
