@@ -1,5 +1,5 @@
-"""The first start of an installation, when nothing is compiled yet: a second process compiles what the hands sense with
-while the first one imports, builds shapes and compiles the rest.
+"""The first start of an installation, when nothing is compiled yet: a second process compiles what hands sense with
+and some smaller kernels, while the first one imports, builds shapes and compiles inverse kinematics.
 
 Run as a module it is that second process; what it compiled it leaves in the cache.
 """
@@ -9,20 +9,32 @@ import sys
 
 from manipnet.kernels import cached
 
+SENSING = "_all_but_readings"
+"""The kernel of `network.features` that takes longest to compile."""
 
-def compile_sensing() -> None:
-    """Compile the kernels of the features, by computing some."""
+
+def compile_aside() -> None:
+    """Compile all kernels of a tick but the solver's, by using each once as a tick does."""
     import numpy as np
 
+    from manipnet.body_track import BodyTrack, sample
+    from manipnet.forecast import damped_velocity
+    from manipnet.hand.joint_sets import pose_in_world
+    from manipnet.hand.limits import keep_angles
     from manipnet.network.features import features
     from manipnet.objects.library import load_library_mesh
     from manipnet.objects.shape import build_shape
-    from manipnet.synthesis import HandScene, state_of, windows_of
+    from manipnet.synthesis import HandScene, windows_of
 
-    rest = state_of(np.zeros(20))
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     scene = HandScene("right", still, still, still, build_shape(load_library_mesh("cube")))
-    features(scene.shape, windows_of([scene]), rest.positions[None], rest.rotations[None])
+    features(scene.shape, windows_of([scene]), np.zeros((1, 22, 3)), np.tile(np.eye(3), (1, 17, 1, 1)))
+    track, angles = BodyTrack(), np.zeros(20)
+    for t_s in (0.0, 0.1):
+        track.add(t_s, still[0])
+    sample([track], np.linspace(-0.5, 0.5, 21), 0.0, 0.1, damped_velocity)
+    keep_angles(angles, np.zeros((20, 2)), angles, 1.0, np.empty(20))
+    pose_in_world(["right"], angles[None], still[:1], 1.0)
 
 
 class Helper:
@@ -31,9 +43,14 @@ class Helper:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
 
+    @property
+    def idle(self) -> bool:
+        """Whether none was needed so far."""
+        return self._process is None
+
     def start(self) -> None:
         """Let it begin, unless everything is in the cache."""
-        if not cached("_all_but_readings"):
+        if not cached(SENSING):
             quiet = subprocess.DEVNULL
             command = [sys.executable, "-m", "manipnet.first_start"]
             self._process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
@@ -45,4 +62,4 @@ class Helper:
 
 
 if __name__ == "__main__":
-    compile_sensing()
+    compile_aside()

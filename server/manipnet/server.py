@@ -79,14 +79,14 @@ class Server:
         self._shown = 0
         self._demo = self._make_demo() if config.demo else None
 
-    def run(self, stopping: Callable[[], bool], sensing_compiled: Callable[[], object] = lambda: None) -> None:
+    def run(self, stopping: Callable[[], bool], compiled_aside: Callable[[], object] = lambda: None) -> None:
         """Listen, say `ready`, turn bodies into hands until `stopping`, close everything.
 
-        `sensing_compiled` as for `warm_up`. Raises `ListenError` for an address that is taken, and `ConfigError` for a
+        `compiled_aside` as for `warm_up`. Raises `ListenError` for an address that is taken, and `ConfigError` for a
         receiver nobody knows.
         """
         shapes = self._wardrobe.shapes() or [self._wardrobe.shape(WARM_UP_SHAPE)]
-        warm_up(self._bundle, shapes, sensing_compiled)
+        warm_up(self._bundle, shapes, compiled_aside)
         with ExitStack() as opened:
             loop, addresses = self._open(opened)
             sys.setswitchinterval(SWITCH_INTERVAL_S)

@@ -10,7 +10,6 @@ import numpy as np
 from manipnet.actor import Actor
 from manipnet.config import default_actor
 from manipnet.flight_recorder import FlightRecorder
-from manipnet.hand.joint_sets import pose_in_world
 from manipnet.ik.pose import pose_by_least_squares, room_for_poses
 from manipnet.mailbox import Mailbox
 from manipnet.network.bundle import Bundle
@@ -31,13 +30,13 @@ LOOK_AHEAD_S = 0.4
 """So that there is something to forecast."""
 
 
-def warm_up(bundle: Bundle, shapes: Sequence[Shape], sensing_compiled: Callable[[], object] = lambda: None) -> None:
+def warm_up(bundle: Bundle, shapes: Sequence[Shape], compiled_aside: Callable[[], object] = lambda: None) -> None:
     """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to.
 
-    `sensing_compiled` returns once another process has compiled what hands sense with.
+    `compiled_aside` returns once another process has compiled the other kernels of a tick.
     """
     _pose_a_hand(bundle, shapes[0])
-    sensing_compiled()
+    compiled_aside()
     for shape in shapes:
         counters, timings = Counters(), Timings()
         mailbox = Mailbox(counters)
@@ -65,13 +64,12 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape], sensing_compiled: Callable[
 
 
 def _pose_a_hand(bundle: Bundle, shape: Shape) -> None:
-    """All that a tick does after sensing."""
+    """Decode and solve: the kernel that only this process compiles at a first start."""
     rest, still = state_of(bundle.rest_angles), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
     outputs, before, poses = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), rest.angles[None], room_for_poses(1)
     poses.correction[:] = 0.0
     pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
-    pose_in_world(["right"], poses.angles, still[:1], 1.0)
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

@@ -12,7 +12,7 @@ from manipnet.objects.repair import is_closed
 from manipnet_tools.bench import main
 from manipnet_tools.bench.performances import demo, endless
 from manipnet_tools.bench.report import verdicts, with_ratios
-from manipnet_tools.bench.rigs import STAGES, TICK, Rig, race
+from manipnet_tools.bench.rigs import STAGES, TICK, TURN, Rig, race
 from manipnet_tools.bench.shapes import gourd
 
 
@@ -43,7 +43,7 @@ def test_stages_are_the_whole_tick(tiny_bundle: Path) -> None:
         assert set(result.stages[name]) == set(STAGES)
         np.testing.assert_allclose(result.total(name), sum(result.stages[name][stage] for stage in TICK))
         assert all((of_stage > 0.0).all() for of_stage in result.stages[name].values())
-    assert len(result.reference) == 5
+    assert len(result.reference) == 5 * TURN
     scenes, states = rigs["two"].synthesizer.asked
     assert len(scenes) == len(states) == 4
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from manipnet_tools.bench.machine import Machine
-from manipnet_tools.bench.rigs import STAGES
+from manipnet_tools.bench.rigs import STAGES, TURN
 
 Figures = dict[str, Any]
 _SHOWN = ("sense", "infer", "ik")
@@ -95,9 +95,9 @@ def lines(figures: Figures, machine: Machine, about: str) -> Iterator[str]:
 
 
 def _stages(tick: Figures) -> Iterator[str]:
-    yield f"\none actor, {tick['triangles']} triangles, {tick['ticks']} ticks in turns with the reference"
+    yield f"\none actor, {tick['triangles']} triangles, {tick['ticks']} ticks in turns of {TURN} with the reference"
     yield f"{'':12} {'p50 ms':>8} {'p99':>8} {'p99.9':>8} {'max':>8}   {'p50 / ref':>9} {'p99 / ref':>9}"
-    for name in (*STAGES[:-1], "total", "encode", "reference"):
+    for name in (*STAGES[:-1], "total", "after others", "encode", "reference"):
         row = tick[name]
         ratios = f"   {row['p50']:9.3f} {row['p99']:9.3f}" if "p50" in row else ""
         yield f"{name:12} " + " ".join(f"{row[k]:8.3f}" for k in ("p50_ms", "p99_ms", "p99.9_ms", "max_ms")) + ratios

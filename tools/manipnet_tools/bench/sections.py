@@ -57,6 +57,7 @@ def _raced(result: Race, name: str) -> Figures:
     p50 = float(np.median(1e3 * result.reference))
     figures = {stage: percentiles(result.stages[name][stage]) for stage in STAGES}
     figures["total"] = percentiles(result.total(name))
+    figures["after others"] = percentiles(result.after_others(name))
     for row in figures.values():
         row |= {"p50": row["p50_ms"] / p50, "p99": row["p99_ms"] / p50}
     return figures | {"reference": percentiles(result.reference), "ticks": len(result.reference)}
