@@ -15,7 +15,7 @@ from manipnet.page.takes_tab import TakesTab
 if TYPE_CHECKING:
     from manipnet.page.process import Page
 
-DOTS = {"live": "🟢", "hold": "🟡", "rest": "⚪"}
+DOTS = {"live": "●", "hold": "◐", "rest": "○"}
 NOTE_S = 6.0
 SHEET = """Lay both hands flat on the calibration sheet (`docs/calibration.md`), wrists on its marks, and keep still
 for 2 s. Then, for the size of the hands, touch its centre line with the fingertips."""
@@ -133,9 +133,9 @@ class Panel:
 def _headline(page: "Page", status: dict[str, Any], history: History) -> str:
     frames = page.live.values()
     if not frames:
-        return "⚪ **Waiting for bodies** — `manipnet doctor` says why nothing arrives"
+        return "○ **Waiting for bodies** — `manipnet doctor` says why nothing arrives"
     latency = next(iter(frames)).message.latency_ms
-    what = f"▶ **{page.recording.name}**" if page.recording is not None else "🟢 **Live**"
+    what = f"▶ **{page.recording.name}**" if page.recording is not None else "● **Live**"
     waits = f"{latency.buffer:.0f} ms ahead + {latency.total - latency.buffer:.1f} ms"
     return f"{what} · {history.rate_hz:.0f} hands/s · {waits}"
 
@@ -150,7 +150,7 @@ def _health(status: dict[str, Any]) -> str:
             age = "never" if age_s is None or not math.isfinite(age_s) else f"{1e3 * age_s:.0f} ms"
             rows.append(f"| {DOTS[health['state']]} | {body} | {rate_hz or 0.0:.0f} | {age} |")
         hands = ", ".join(f"{side} {hand['state']}" for side, hand in actor["hands"].items())
-        rows.append(f"| ✋ | {hands} | | |")
+        rows.append(f"| | {hands} | | |")
     counters = status["counters"]
     lost = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
     return "\n".join(rows) + f"\n\n{lost} frames and bodies refused since the start"

@@ -12,9 +12,7 @@ TABLE_M: Final = (0.62, 0.03)
 TABLE_COLOR: Final = (66, 71, 80)
 VIEW: Final = np.array([0.22, 0.50, 0.85])
 """From the hands to the camera."""
-VIEW_M: Final = 0.86
-SIDEWAYS_M: Final = 0.11
-"""Cameras look this far to the right of the middle: there the controls cover the picture."""
+VIEW_M: Final = 0.92
 KEY_M, RIM_M = np.array([0.35, 1.4, 0.55]), np.array([-0.8, 0.6, -0.9])
 """From the hands to the lights."""
 FIELD_OF_VIEW_RAD: Final = 0.70
@@ -66,9 +64,7 @@ class Stage:
     def look(self, camera: viser.CameraHandle) -> None:
         """Let a visitor's camera see the hands."""
         back = VIEW / np.linalg.norm(VIEW)
-        right = np.cross([0.0, 1.0, 0.0], back)
-        target = self._center + SIDEWAYS_M * right / np.linalg.norm(right)
         camera.up_direction = (0.0, 1.0, 0.0)
         camera.fov = FIELD_OF_VIEW_RAD
-        camera.position = tuple(target + VIEW_M * back)
-        camera.look_at = tuple(target)
+        camera.position = tuple(self._center + VIEW_M * back)
+        camera.look_at = tuple(self._center)

@@ -51,7 +51,7 @@ class TakesTab:
             self._recording = now is not None
             self._record.label = "Stop recording" if self._recording else "Record"
             self._record.icon = viser.Icon.PLAYER_STOP if self._recording else viser.Icon.PLAYER_RECORD
-        self._told.content = f"🔴 **{now['name']}** · {now['seconds']:.0f} s" if now else f"into `{self._folder}`"
+        self._told.content = f"● **{now['name']}** · {now['seconds']:.0f} s" if now else f"into `{self._folder}`"
 
     def _toggle_record(self) -> str | None:
         if not self._recording:
