@@ -55,9 +55,9 @@ class Gatekeeper:
         self._zap: zmq.Socket | None = None
         if keys is not None:
             secure_server(socket, keys)
-            self._zap = context.socket(zmq.REP)
-            self._zap.setsockopt(zmq.LINGER, 0)
-            self._zap.bind(ZAP_ADDRESS)
+            zap = self._zap = context.socket(zmq.REP)
+            zap.setsockopt(zmq.LINGER, 0)
+            zap.bind(ZAP_ADDRESS)
         socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_MS)
         self._monitor = socket.get_monitor_socket(_EVENTS)
         self._thread = threading.Thread(target=self._run, name="gatekeeper", daemon=True)
