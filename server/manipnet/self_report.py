@@ -50,9 +50,7 @@ def of_motive(status: Mapping[str, Any]) -> list[Finding]:
             )
         )
     elif status["state"] == "silent":
-        findings.append(
-            Finding("problem", "Motive has fallen silent", "is it still running, its cable plugged in?")
-        )
+        findings.append(Finding("problem", "Motive has fallen silent", "is it still running, its cable plugged in?"))
     elif status["state"] != "streaming":
         findings.append(
             Finding(
