@@ -36,7 +36,9 @@ def test_the_second_line_says_what_is_going_on(tiny_bundle: Path) -> None:
         assert server.line().startswith("waiting for bodies")
 
 
-@pytest.mark.parametrize("option", ["--port", "--input-port", "--control-port", "--osc-port", "--page-port", "--web-port"])
+@pytest.mark.parametrize(
+    "option", ["--port", "--input-port", "--control-port", "--osc-port", "--page-port", "--web-port"]
+)
 def test_a_port_in_use_is_named_with_its_option(
     tiny_bundle: Path, capsys: pytest.CaptureFixture[str], option: str
 ) -> None:

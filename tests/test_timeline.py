@@ -357,7 +357,7 @@ def test_the_log_of_rotation_in_a_window_is_steady() -> None:
 
 @pytest.mark.parametrize("drift", [-1e-4, 1e-4])
 def test_a_senders_clock_may_drift_from_ours(drift: float) -> None:
-    """Ticks go by the sender's time, and each still leaves with the frame that completes it: delay does not build up."""
+    """Ticks go by the sender's time, and each leaves with the frame that completes it: delay does not build up."""
     timeline = Timeline(0.1)
     ticks: list[tuple[float, Tick]] = []
     for i in range(20 * 60):
