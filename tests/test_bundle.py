@@ -1,13 +1,14 @@
 """Where a network runs: a GPU that cannot be had costs a line of the log and nothing else."""
 
 import logging
+import shutil
 from pathlib import Path
 
 import numpy as np
 import onnxruntime
 import pytest
 
-from manipnet.network.bundle import load_bundle
+from manipnet.network.bundle import BundleError, load_bundle
 from manipnet.network.layout import INPUT_SIZE
 
 HAS_CUDA = "CUDAExecutionProvider" in onnxruntime.get_available_providers()
@@ -36,3 +37,11 @@ def test_a_network_has_one_thread(tiny_bundle: Path) -> None:
     options = load_bundle(tiny_bundle).session.get_session_options()
     assert options.intra_op_num_threads == options.inter_op_num_threads == 1
     assert options.execution_mode == onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+
+
+def test_endlessly_nested_json_is_refused(tiny_bundle: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "nested"
+    shutil.copytree(tiny_bundle, folder)
+    (folder / "bundle.json").write_text('{"format": ' * 100_000)
+    with pytest.raises(BundleError, match="not JSON"):
+        load_bundle(folder)

@@ -74,7 +74,7 @@ def fuzz(name: str, cases: int, seed: int = 1, seconds: float = math.inf) -> Tal
             if tally.cases % GOOD_EVERY == 0:
                 target.read(target.place(target.good[0]))
         except Exception as error:
-            raise AssertionError(f"{name}: {type(error).__name__}: {error}: {data!r}") from error
+            raise AssertionError(f"{name}: {type(error).__name__}: {str(error)[:500]}: {data[:2000]!r}") from error
     return tally
 
 
