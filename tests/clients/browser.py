@@ -28,7 +28,7 @@ class Page:
         """One request of the DevTools protocol, and its answer."""
         number = next(self._ids)
         self._connection.send(json.dumps({"id": number, "method": method, "params": params}))
-        while (answer := json.loads(self._connection.recv(timeout=30))).get("id") != number:
+        while (answer := json.loads(self._connection.recv(timeout=240))).get("id") != number:
             pass
         return answer["result"]
 
