@@ -1,7 +1,6 @@
 """Calibrating and placing without a server around: the requests, an actor that was shown the sheet, a rig file."""
 
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,6 +23,7 @@ from manipnet.telemetry import Counters
 RIG = '# mine\n[bodies]\nleft_wrist = "left_wrist"  # taped\nright_wrist = "right_wrist"\n'
 CLUSTER = np.concatenate([[0.03, 0.02, -0.01], quat_exp(np.array([1.0, -2.0, 0.5]))])
 SEEN_HZ = 120
+NOW_S = 500.0
 
 
 @pytest.fixture
@@ -51,18 +51,18 @@ def cast(rig: Path) -> Iterator[Cast]:
 
 def show(cast: Cast, drift_m_s: float = 0.0) -> None:
     """Both hands on a sheet at the origin for the two seconds before now."""
-    rng, now_s = np.random.default_rng(1), time.monotonic()
+    rng = np.random.default_rng(1)
     for i in range(-2 * SEEN_HZ - 30, 1):
         samples = []
         for side in ("left", "right"):
             pose = compose(wrist_on_sheet(side), invert(CLUSTER))
             p = pose[:3] + rng.normal(0.0, 5e-4, 3) + [drift_m_s * i / SEEN_HZ, 0.0, 0.0]
             samples.append(BodySample(None, f"{side}_wrist", tuple(p), tuple(pose[3:]), True))
-        cast.actors[0].push(BodyFrame(10.0 + i / SEEN_HZ, i, tuple(samples), now_s + i / SEEN_HZ, "zmq:test"))
+        cast.actors[0].push(BodyFrame(10.0 + i / SEEN_HZ, i, tuple(samples), NOW_S + i / SEEN_HZ, "zmq:test"))
 
 
 def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(cast: Cast, rig: Path) -> None:
-    calibrate = Placing(cast, rig).handlers()["calibrate"]
+    calibrate = Placing(cast, rig, lambda: NOW_S).handlers()["calibrate"]
     show(cast)
     answer = calibrate({"op": "calibrate"})
     assert answer["stored"] == str(rig)
@@ -81,13 +81,13 @@ def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(ca
 def test_a_hand_that_moved_changes_nothing(cast: Cast, rig: Path) -> None:
     show(cast, drift_m_s=0.01)
     with pytest.raises(RequestError, match=r"left_wrist moved .* lay the hand down and try again"):
-        Placing(cast, rig).handlers()["calibrate"]({"op": "calibrate"})
+        Placing(cast, rig, lambda: NOW_S).handlers()["calibrate"]({"op": "calibrate"})
     assert rig.read_text(encoding="utf-8") == RIG
     assert np.array_equal(cast.actors[0].offset("left_wrist"), [0, 0, 0, 0, 0, 0, 1])
 
 
 def test_without_a_rig_file_it_lasts_until_the_server_stops(cast: Cast) -> None:
     show(cast)
-    answer = Placing(cast, None).handlers()["calibrate"]({"op": "calibrate"})
+    answer = Placing(cast, None, lambda: NOW_S).handlers()["calibrate"]({"op": "calibrate"})
     assert answer["stored"] is None
     assert "started without --rig" in answer["note"]

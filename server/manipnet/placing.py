@@ -2,7 +2,7 @@
 file. They look back at what was tracked, so nobody waits: hold still first, ask then."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,9 +28,9 @@ NOT_STORED: Final = "the server was started without --rig FILE: this lasts until
 class Placing:
     """The operations of `docs/calibration.md`."""
 
-    def __init__(self, cast: Cast, rig: Path | None) -> None:
-        """`rig` is the file the actors came from, if any."""
-        self._cast, self._rig = cast, rig
+    def __init__(self, cast: Cast, rig: Path | None, clock: Callable[[], float] = time.monotonic) -> None:
+        """`rig` is the file the actors came from, if any; `clock` is the receivers'."""
+        self._cast, self._rig, self._clock = cast, rig, clock
         self._backed_up = False
 
     def handlers(self) -> dict[str, Handler]:
@@ -44,7 +44,7 @@ class Placing:
         wanted = choice(request, "hand", ("both", *sides), default="both")
         sides = [side for side in sides if wanted in ("both", side)]
         reference = None if request.get("reference") is None else self._reference(actor, request)
-        look = Look(self._cast, actor, number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
+        look = Look(self._cast, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
         try:
             shown = look.at([*(f"{side}_wrist" for side in sides), *([reference] if reference else [])])
             sheet = self._sheet(request, actor, reference, shown)
@@ -118,7 +118,7 @@ class Placing:
 
     def _on_sheet(self, request: Request, actor: Actor, part: str, lowest_m: float) -> Array:
         """Where an object sits on its body that stands upright in the middle of the sheet."""
-        look = Look(self._cast, actor, number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
+        look = Look(self._cast, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
         try:
             body = look.at([part])[part]
         except CalibrationError as error:
@@ -155,8 +155,8 @@ class Placing:
 class Look:
     """A look back at what was tracked of an actor."""
 
-    def __init__(self, cast: Cast, actor: Actor, seconds: float) -> None:
-        self._cast, self._actor, self._seconds = cast, actor, seconds
+    def __init__(self, cast: Cast, actor: Actor, now_s: float, seconds: float) -> None:
+        self._cast, self._actor, self._now_s, self._seconds = cast, actor, now_s, seconds
 
     def at(self, parts: Sequence[str]) -> dict[str, Steady]:
         """Each part's body as it was held still. Raises `CalibrationError` and `RequestError`."""
@@ -167,7 +167,7 @@ class Look:
         }
 
     def _of(self, part: str) -> tuple[Array, float]:
-        health = self._actor.health(time.monotonic())[part]
+        health = self._actor.health(self._now_s)[part]
         if health.age_s > HOLD_AFTER_S:
             raise ValueError(f"{part} is not tracked at present; see it in the tracking software (`manipnet doctor`)")
         return self._actor.body_poses(part, self._seconds), health.rate_hz
