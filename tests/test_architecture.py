@@ -105,6 +105,14 @@ def test_nothing_that_runs_code_is_read_from_a_wire_or_file(path: Path) -> None:
             assert safe.get("allow_pickle") == "False" or safe.get("weights_only") == "True", ast.unparse(node)
 
 
+@pytest.mark.parametrize("path", modules(SERVER), ids=lambda path: path.name)
+def test_private_pipes_carry_bytes(path: Path) -> None:
+    if "multiprocessing" in imported(path):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "recv":
+                assert node.args, f"{ast.unparse(node)} unpickles; recv_bytes does not"
+
+
 def test_tools_are_a_package_of_their_own() -> None:
     for path in modules(TOOLS):
         for name in imported(path):

@@ -18,6 +18,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
 
+import msgpack
+
 from manipnet.control import Handler, Request, RequestError
 from manipnet.geometry import Array
 from manipnet.props import Prop
@@ -112,7 +114,9 @@ class Recorder:
                 raise RequestError("nothing is being recorded; record begins")
             take.ended.set()
             take.thread.join(STOP_S)
-            told = take.connection.recv() if take.connection.poll(STOP_S) else {"error": "its process does not answer"}
+            told = {"error": "its process does not answer"}
+            if take.connection.poll(STOP_S):
+                told = msgpack.unpackb(take.connection.recv_bytes())
             take.connection.close()
             take.process.join(STOP_S)
         if "error" in told:
@@ -171,7 +175,7 @@ def _write(connection: Connection, path: Path, metadata: dict[str, str], meshes:
     except Exception as error:
         told = {"error": f"{type(error).__name__}: {error}"}
     with suppress(OSError):
-        connection.send(told)
+        connection.send_bytes(msgpack.packb(told) or b"")
 
 
 def carried(props: Sequence[Prop]) -> str:

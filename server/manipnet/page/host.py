@@ -19,6 +19,7 @@ from typing import Any, Final
 from manipnet.actor import Actor, Plan
 from manipnet.objects.shape import Shape
 from manipnet.page.frames import Frame, HandView, PropView, ShapeView
+from manipnet.page.parcels import pack, unpack
 from manipnet.streams.intake import ListenError
 from manipnet.streams.wire import HandsMessage
 from manipnet.synthesis import HandStep, Side
@@ -132,14 +133,14 @@ class LivePage:
             try:
                 if not ours.poll(POLL_S):
                     continue
-                what, content = ours.recv()
+                what, content = unpack(ours.recv_bytes())
             except (EOFError, OSError):
                 return
             if what == "watched":
                 self.watched = content
             elif what == "ask":
                 number, request = content
-                self._tell(ours, ("answer", (number, self._answer([request]))))
+                self._tell(ours, "answer", (number, self._answer([request])))
             elif what == "log":
                 _log.log(content[0], "%s", content[1])
 
@@ -158,14 +159,15 @@ class LivePage:
                         sent.add(shape.content_hash)
                         mesh = shape.mesh
                         view = ShapeView(shape.name, shape.content_hash, mesh.vertices, mesh.faces)
-                        self._tell(ours, ("shape", view))
-                self._tell(ours, ("frame", frame))
+                        self._tell(ours, "shape", view)
+                self._tell(ours, "frame", frame)
                 self._counters.add("page_frames", fate="shown")
             time.sleep(max(begin_s + 1.0 / FRAMES_HZ - time.monotonic(), 0.0))
 
-    def _tell(self, ours: Connection, message: tuple[str, Any]) -> None:
+    def _tell(self, ours: Connection, what: str, content: Any) -> None:
+        parcel = pack(what, content)
         with self._telling, contextlib.suppress(OSError, ValueError):  # it has ended; who listens to it notices
-            ours.send(message)
+            ours.send_bytes(parcel)
 
 
 def _hands(actor: Actor, plan: Plan, steps: Mapping[Side, HandStep]) -> dict[Side, HandView]:

@@ -12,6 +12,8 @@ from typing import Any, Final
 
 import msgpack
 
+from manipnet.page.parcels import pack, unpack
+
 ANSWER_S: Final = 60.0
 """A shape of a large mesh takes a while to build."""
 
@@ -33,7 +35,7 @@ class Link:
         """Everything but answers, as it comes; ends when the server does."""
         with contextlib.suppress(EOFError, OSError):
             while True:
-                what, content = self._connection.recv()
+                what, content = unpack(self._connection.recv_bytes())
                 if what == "answer":
                     number, answer = content
                     self._asked.pop(number).set_result(msgpack.unpackb(answer))
@@ -44,7 +46,7 @@ class Link:
         """One control request, as in docs/protocol.md, and its answer. Raises `RefusedError`."""
         number, answer = next(self._numbers), Future()
         self._asked[number] = answer
-        self._send(("ask", (number, msgpack.packb(request))))
+        self._send("ask", (number, msgpack.packb(request)))
         try:
             reply = answer.result(ANSWER_S)
         except FutureTimeoutError:
@@ -55,15 +57,15 @@ class Link:
 
     def watch(self, watched: bool) -> None:
         """Tell whether a browser is open."""
-        self._send(("watched", watched))
+        self._send("watched", watched)
 
     def log(self, level: int, text: str) -> None:
         """A line for the server's log."""
-        self._send(("log", (level, text)))
+        self._send("log", (level, text))
 
-    def _send(self, message: tuple[str, Any]) -> None:
+    def _send(self, what: str, content: Any) -> None:
         with self._sending, contextlib.suppress(OSError):  # the server has ended: `incoming` notices
-            self._connection.send(message)
+            self._connection.send_bytes(pack(what, content))
 
 
 class LinkLog(logging.Handler):
