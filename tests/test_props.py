@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipnet.geometry import Array, invert, mirror_points, quat_normalize, transform
+from manipnet.geometry import Array, invert, quat_normalize, transform
 from manipnet.objects.library import load_library_mesh
 from manipnet.objects.shape import build_shape
 from manipnet.props import HYSTERESIS_M, PALM_M, Prop, choose_prop
@@ -21,7 +21,7 @@ def props(tmp_path_factory: pytest.TempPathFactory) -> list[Prop]:
 
 def nearest(side: str, wrist: Array, props: list[Prop], poses: dict[str, Array], current: str | None) -> Prop:
     """The same by brute force."""
-    palm = transform(wrist, PALM_M if side == "right" else mirror_points(PALM_M))
+    palm = transform(wrist, np.array(PALM_M[side]))
     distances = [
         prop.shape.signed_distance(transform(invert(poses[prop.name]), palm)[None] / prop.scale)[0][0] * prop.scale
         - HYSTERESIS_M * (prop.name == current)

@@ -111,7 +111,7 @@ def test_an_object_is_swapped_while_the_hands_are_on_it(stage: Stage) -> None:
     messages = stage.perform(1.0, poses)
     first_shown = swapped.pop("seq")
     assert swapped == {"actor": "actor", "body": "Box", "object": "sphere", "scale": 0.8}
-    assert messages[0].seq <= first_shown < messages[-1].seq
+    assert messages[0].seq - 1 <= first_shown < messages[-1].seq, "the tick in the making may be the one before"
     assert len(messages) == 61
     assert {hand.object for m in messages for hand in m.hands.values()} == {"Box"}
     assert carried(stage) == ("sphere", 0.8)

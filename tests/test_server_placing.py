@@ -125,7 +125,7 @@ def test_what_cannot_be_used_is_refused_and_nothing_changes(stage: Stage, rig: P
     crossed = dict(zip(SIDES, reversed(shown().values()), strict=True))
     refused = {
         "left_wrist is not tracked at present": stage.server.ask({"op": "calibrate"}),
-        "the left hand's mark": ask_while(stage, crossed, op="calibrate", sheet=SHEET_SAID),
+        "it is at the right hand's mark": ask_while(stage, crossed, op="calibrate", sheet=SHEET_SAID),
         "m from the left wrist's mark, at most 0.20 m": ask_while(stage, shown(), op="calibrate"),
     }
 

@@ -44,12 +44,12 @@ class Placing:
         wanted = choice(request, "hand", ("both", *sides), default="both")
         sides = [side for side in sides if wanted in ("both", side)]
         reference = None if request.get("reference") is None else self._reference(actor, request)
+        scale = self._typed_scale(request, actor)
         look = Look(self._cast, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
         try:
             shown = look.at([*(f"{side}_wrist" for side in sides), *([reference] if reference else [])])
             sheet = self._sheet(request, actor, reference, shown)
             if step == "wrists":
-                scale = self._typed_scale(request, actor)
                 offsets = {
                     f"{side}_wrist": calibration.calibrate_wrist(side, shown[f"{side}_wrist"], sheet, scale)
                     for side in sides
