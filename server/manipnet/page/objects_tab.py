@@ -24,6 +24,8 @@ class ObjectsTab:
     def __init__(self, page: "Page", gui: viser.GuiApi, doing: Doing) -> None:
         self._page, self._doing = page, doing
         self._carried: dict[str, dict[str, Any]] = {}
+        self._shown = ""
+        """The object the controls speak of."""
         self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NONES)
         self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Carries", NONES)
         self._scale = gui.add_slider("Size", 0.2, 3.0, 0.05, initial_value=1.0)
@@ -59,11 +61,14 @@ class ObjectsTab:
         if self._body.options != bodies:
             self._body.options = bodies
             self._show_body()
+        elif self._carried and self._carried[self._body.value]["object"] != self._shown:  # swapped by a drop or another
+            self._show_body()
 
     def _show_body(self) -> None:
         prop = self._carried.get(self._body.value)
         if prop is None:
             return
+        self._shown = prop["object"]
         if prop["object"] in self._object.options:
             self._object.value = prop["object"]
         self._scale.value = min(max(prop["scale"], self._scale.min), self._scale.max)

@@ -1,6 +1,7 @@
 """The panel of one visitor: how things stand for everybody, controls for those who may."""
 
 import math
+import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +18,10 @@ if TYPE_CHECKING:
 
 DOTS = {"live": "●", "hold": "◐", "rest": "○"}
 NOTE_S = 6.0
-SHEET = """Lay both hands flat on the calibration sheet (`docs/calibration.md`), wrists on its marks, and keep still
-for 2 s. Then, for the size of the hands, touch its centre line with the fingertips."""
+COUNTDOWN_S = 3
+"""From the click to the request, which looks back 2 s: the hand that clicked must lie still by then."""
+SHEET = """Lay both hands flat on the calibration sheet (`docs/calibration.md`), wrists on its marks, click, and keep
+still until the countdown ends. Then, for the size of the hands, touch its centre line with the fingertips."""
 
 
 class Panel:
@@ -85,8 +88,8 @@ class Panel:
         gui.add_markdown(SHEET)
         wrists = gui.add_button("Hands are on the marks", icon=viser.Icon.HAND_STOP)
         tips = gui.add_button("Fingertips touch the line", icon=viser.Icon.HAND_FINGER)
-        self._on_click(wrists, lambda: self._calibrate("wrists"))
-        self._on_click(tips, lambda: self._calibrate("fingertips"))
+        self._on_click(wrists, lambda: self._calibrate("wrists", wrists))
+        self._on_click(tips, lambda: self._calibrate("fingertips", tips))
 
     def _scene(self, gui: viser.GuiApi) -> None:
         slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
@@ -108,8 +111,15 @@ class Panel:
     def _toggle_pause(self) -> None:
         self._page.link.ask(op="pause", on=not self._paused)
 
-    def _calibrate(self, step: str) -> str:
-        answer = self._page.link.ask(op="calibrate", step=step)
+    def _calibrate(self, step: str, button: viser.GuiButtonHandle) -> str:
+        label, button.disabled = button.label, True
+        try:
+            for left in range(COUNTDOWN_S, 0, -1):
+                button.label = f"Keep still … {left}"
+                time.sleep(1.0)
+            answer = self._page.link.ask(op="calibrate", step=step)
+        finally:
+            button.label, button.disabled = label, False
         kept = f"kept in {answer['stored']}" if answer.get("stored") else answer.get("note", "")
         return f"quality {answer['quality']}, hands {answer['hand_scale']:.3f} times the model's; {kept}"
 

@@ -64,23 +64,27 @@ class TakesTab:
         if self._take.value == NONE:
             raise ValueError("there is no recording yet; press Record")
         recording = read_recording(self._folder / self._take.value)
-        self._playing.clear()
+        self._hold()
         self._page.play(recording)
         self._scrub.max, self._scrub.value = max(round(recording.seconds, 2), 0.01), 0.0
         self._scrub.visible = self._play.visible = self._live.visible = True
 
     def _back(self) -> None:
-        self._playing.clear()
+        self._hold()
         self._page.play(None)
         self._scrub.visible = self._play.visible = self._live.visible = False
 
     def _toggle_play(self) -> None:
         if self._playing.is_set():
-            self._playing.clear()
-        else:
-            self._playing.set()
-            threading.Thread(target=self._run, name="playback", daemon=True).start()
-        self._play.label = "Hold" if self._playing.is_set() else "Play"
+            self._hold()
+            return
+        self._playing.set()
+        self._play.label, self._play.icon = "Hold", viser.Icon.PLAYER_PAUSE
+        threading.Thread(target=self._run, name="playback", daemon=True).start()
+
+    def _hold(self) -> None:
+        self._playing.clear()
+        self._play.label, self._play.icon = "Play", viser.Icon.PLAYER_PLAY
 
     def _run(self) -> None:
         """Play from where the slider is, over and over."""
