@@ -3,7 +3,6 @@
 from typing import Final
 
 import numpy as np
-import trimesh
 import viser
 from numpy.typing import NDArray
 
@@ -33,6 +32,8 @@ NEAR, FAR = np.array([255.0, 92.0, 60.0]), np.array([70.0, 140.0, 255.0])
 AMBIENT_COLOR: Final = (255, 190, 80)
 TOUCH_COLOR: Final = (255, 72, 40)
 TARGET_COLOR: Final = (80, 255, 160)
+OCCUPIED: Final = 0.3
+"""Share of a cell inside the object from which it is shown."""
 RAW_COLOR: Final = (255, 255, 255)
 PATH_COLOR: Final = (140, 190, 255)
 
@@ -41,28 +42,21 @@ class HandLayers:
     """The sensors, contacts and targets of one hand, under `name`."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        cube = trimesh.creation.box((CELL_M, CELL_M, CELL_M))
-        count = len(CELL_CENTERS)
-        self._ambient = scene.add_batched_meshes_simple(
-            f"{name}/ambient",
-            np.asarray(cube.vertices),
-            np.asarray(cube.faces),
-            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-            batched_positions=np.zeros((count, 3)),
-            batched_scales=np.zeros(count),
-            batched_colors=AMBIENT_COLOR,
-            opacity=0.30,
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        self._ambient = _points(scene, f"{name}/ambient", len(CELL_CENTERS), 0.35 * CELL_M, AMBIENT_COLOR)
         self._rays = scene.add_line_segments(
-            f"{name}/rays", np.zeros((SENSOR_COUNT, 2, 3)), np.zeros((SENSOR_COUNT, 2, 3), np.uint8), thickness=1.5
+            f"{name}/rays",
+            np.zeros((SENSOR_COUNT, 2, 3)),
+            np.zeros((SENSOR_COUNT, 2, 3), np.uint8),
+            thickness=1.5,
+            thickness_units="screen",
         )
         self._points = _points(scene, f"{name}/sensors", SENSOR_COUNT, 0.0035)
         self._touches = _points(scene, f"{name}/contacts", SENSOR_COUNT, 0.009, TOUCH_COLOR)
         self._raw = _points(scene, f"{name}/raw", 22, 0.004, RAW_COLOR)
         self._targets = _points(scene, f"{name}/targets", 22, 0.007, TARGET_COLOR)
-        self._aims = scene.add_line_segments(f"{name}/aims", np.zeros((22, 2, 3)), TARGET_COLOR, thickness=2.0)
+        self._aims = scene.add_line_segments(
+            f"{name}/aims", np.zeros((22, 2, 3)), TARGET_COLOR, thickness=2.0, thickness_units="screen"
+        )
 
     def show(self, senses: Senses | None, shown: set[str]) -> None:
         """The layers in `shown`; none without senses."""
@@ -74,8 +68,7 @@ class HandLayers:
         if senses is None:
             return
         if "ambient" in shown:
-            self._ambient.batched_positions = _f32(senses.cells)
-            self._ambient.batched_scales = _f32(0.9 * np.cbrt(np.clip(senses.ambient, 0.0, 1.0)))
+            self._show_ambient(senses)
         if "proximity" in shown:
             self._show_proximity(senses)
         if "contacts" in shown:
@@ -87,6 +80,12 @@ class HandLayers:
         if "targets" in shown:
             self._raw.points, self._targets.points = _f32(senses.raw), _f32(senses.targets)
             self._aims.points = _f32(np.stack([senses.raw, senses.targets], axis=1))
+
+    def _show_ambient(self, senses: Senses) -> None:
+        full = senses.ambient > OCCUPIED
+        self._ambient.visible = bool(full.any())
+        if full.any():
+            self._ambient.points = _f32(np.where(full[:, None], senses.cells, senses.cells[full][0]))
 
     def _show_proximity(self, senses: Senses) -> None:
         nearness = 1.0 - np.clip(np.abs(senses.readings) / SENSOR_RANGE_M, 0.0, 1.0)[:, None]
@@ -129,7 +128,7 @@ class Ghost:
         segments = _f32(np.stack([future[:-1], future[1:]], axis=1))
         if name not in self._paths:
             self._paths[name] = self._scene.add_line_segments(
-                f"{self._name}/path/{name}", segments, PATH_COLOR, thickness=2.0
+                f"{self._name}/path/{name}", segments, PATH_COLOR, thickness=2.0, thickness_units="screen"
             )
         self._paths[name].points = segments
         return self._paths[name]
