@@ -18,7 +18,7 @@ from platformdirs import user_cache_dir
 
 kernel = njit(cache=True, nogil=True, error_model="numpy")
 """A compiled function that Python calls: cached on disk, without the interpreter's lock, x / 0 as NumPy has it."""
-inner = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+inner = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore
 """A compiled function that only kernels call: part of theirs in the cache, and without a way in that takes a tenth of
 the compiling."""
 
@@ -30,7 +30,7 @@ _KEEP_S = 7 * 86400.0
 
 def cached(name: str) -> bool:
     """Whether the kernel of this name is in the cache; True as well where there is no folder for it of our own."""
-    return not config.CACHE_DIR or any(Path(config.CACHE_DIR).rglob(f"*.{name}-*.nbi"))
+    return not config.CACHE_DIR or any(Path(config.CACHE_DIR).rglob(f"*.{name}-*.nbi"))  # pyright: ignore
 
 
 def _package_state() -> str:

@@ -26,8 +26,8 @@ class ObjectsTab:
         self._carried: dict[str, dict[str, Any]] = {}
         self._shown = ""
         """The object the controls speak of."""
-        self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NONES)
-        self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Carries", NONES)
+        self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NONES)  # pyright: ignore
+        self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Carries", NONES)  # pyright: ignore
         self._scale = gui.add_slider("Size", 0.2, 3.0, 0.05, initial_value=1.0)
         self._position = gui.add_vector3("Moved, mm", (0.0, 0.0, 0.0), step=1.0)
         self._turn = gui.add_vector3("Turned, °", (0.0, 0.0, 0.0), step=1.0)

@@ -67,4 +67,4 @@ class Stage:
         camera.up_direction = (0.0, 1.0, 0.0)
         camera.fov = FIELD_OF_VIEW_RAD
         camera.position = tuple(self._center + VIEW_M * back)
-        camera.look_at = tuple(self._center)
+        camera.look_at = self._center
