@@ -113,6 +113,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     stop = _stop_on_signals()
     terminal = Terminal(as_json=arguments.log_format == "json")
     logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
+    if not helper.idle:
+        logging.getLogger(__name__).warning("first start here: some 15 s go by while code is compiled, once")
     try:
         server = Server(configure(arguments), terminal.say)
         server.run(stop.is_set, helper.wait)
