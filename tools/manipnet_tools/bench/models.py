@@ -8,7 +8,7 @@ from manipnet.network.bundle import Bundle, BundleError, load_bundle, open_sessi
 from manipnet.network.layout import OUTPUT
 from manipnet_tools.bench.reference import full_graph
 
-FULL = "manipnet-full"
+FULL = "manipnet-full-int8"
 
 
 @dataclass(frozen=True)
