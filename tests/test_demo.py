@@ -2,6 +2,7 @@
 
 import math
 import queue
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from manipnet.config import ConfigError, parse_object
 from manipnet.demo.performance import DEMO_FILE, DEMO_OBJECTS, Demo, connectable, demo_objects
 from manipnet.recording import RecordingWriter, read_bodies
 from manipnet.streams.bodies import BodyFrame, BodySample
+from manipnet.streams.gates import BodyGate
 from manipnet.streams.zmq_bodies import ZmqBodies
 from manipnet.telemetry import Counters
 
@@ -43,6 +45,14 @@ def test_the_performance_ends_as_it_begins() -> None:
     for first, last in zip(frames[0].bodies, frames[-1].bodies, strict=True):
         assert np.allclose(first.p, last.p, atol=2e-3)
         assert abs(np.dot(first.q, last.q)) > math.cos(math.radians(0.5))
+
+
+def test_a_prop_that_lies_still_in_every_loop_is_never_taken_for_frozen() -> None:
+    frames, gate = list(read_bodies(DEMO_FILE)), BodyGate()
+    period_s = frames[-1].t_s + frames[1].t_s - 2.0 * frames[0].t_s
+    for loop in range(10):
+        for frame in frames:
+            assert gate.check(replace(frame, t_s=frame.t_s + loop * period_s, source="demo"))[1] == []
 
 
 def test_the_server_performs(tiny_bundle: Path) -> None:

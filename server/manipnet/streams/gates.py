@@ -23,8 +23,9 @@ SWAP_SPEED_M_S = 4.0
 SWAP_RATIO = 0.25
 """Two bodies faster than this, each this near to where the other was (of the way they made), have swapped."""
 NOISE_M = 1e-3
-NOISE_TURNS = 30
-"""Changes of direction within so small steps that show a tracker's noise, which never stands still."""
+NOISE_TURNS = 20
+"""Noise turns back at most of its small steps, which motion never does: a tracker whose body has shown so many more
+small steps back than on has noise, and then it never stands still."""
 FROZEN_S = 0.5
 MOVING_S = 0.1
 """A body is frozen that has not changed for `FROZEN_S` while others of its sender did within `MOVING_S`."""
@@ -152,8 +153,8 @@ def _stands_still(memory: _Memory, t_s: float, body: BodySample) -> bool:
         body.p[2] - memory.sample.p[2],
     )
     turned = sum(a * b for a, b in zip(step, memory.step, strict=True)) < 0.0
-    if turned and math.hypot(*step) < NOISE_M:
-        memory.noise_turns += 1
+    if memory.noise_turns < NOISE_TURNS and math.hypot(*step) < NOISE_M:
+        memory.noise_turns = memory.noise_turns + 1 if turned else max(memory.noise_turns - 1, 0)
     memory.step, memory.changed_s = step, t_s
     return False
 
