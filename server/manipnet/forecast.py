@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import inner, kernel
+from manipnet.kernels import inner, kernel, vector
 
 FIT_S: Final = 0.035
 """The velocity is fitted to this much history: enough to average tracking noise, little enough to be present."""
@@ -58,8 +58,9 @@ def _turned_into(turn, q, out):
 @kernel
 def _damped_velocity(times, poses, future, out):
     newest = len(times) - 1
-    last, turn = poses[newest], np.empty(3)
-    velocity, spin, weight = np.zeros(3), np.zeros(3), 0.0
+    last, turn, velocity, spin, weight = poses[newest], vector(), vector(), vector(), 0.0
+    for k in range(3):
+        velocity[k] = spin[k] = 0.0
     for i in range(newest - 1, -1, -1):
         t = times[i] - times[newest]
         if t < -FIT_S - 1e-6 and i < newest - 1:

@@ -6,21 +6,60 @@ machine code, and it is the user's own folder, so a read-only installation is ca
 """
 
 import hashlib
+import math
 import os
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numba
-from numba import njit
-from numba.core import config
+from numba import njit, types
+from numba.core import cgutils, config
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array, populate_array
 from platformdirs import user_cache_dir
 
-kernel = njit(cache=True, nogil=True, error_model="numpy")
-"""A compiled function that Python calls: cached on disk, without the interpreter's lock, x / 0 as NumPy has it."""
-inner = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore
+kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # pyright: ignore
+"""A compiled function that Python calls: cached on disk, without the interpreter's lock, x / 0 as NumPy has it.
+
+Nothing in it allocates or counts references: counting those of a shape's arrays took longer than looking up distances.
+"""
+inner = njit(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore
 """A compiled function that only kernels call: part of theirs in the cache, and without a way in that takes a tenth of
 the compiling."""
+
+
+def on_stack(*shape: int, dtype=types.float64) -> Callable[[], Any]:
+    """A function for kernels that gives an array of this shape to work in, unfilled and gone when they return.
+
+    One place for each call in the source, so an array made in a loop is the same one every time round.
+    """
+
+    @intrinsic
+    def room(_):
+        kind = types.Array(dtype, len(shape), "C")
+
+        def generate(context, builder, _signature, _arguments):
+            def number(value: int):
+                return context.get_constant(types.intp, value)
+
+            item = context.get_data_type(dtype)
+            size = context.get_abi_sizeof(item)
+            strides = [number(size * math.prod(shape[axis + 1 :])) for axis in range(len(shape))]
+            data = cgutils.alloca_once(builder, item, size=number(math.prod(shape)))
+            array = make_array(kind)(context, builder)
+            populate_array(array, data, [number(length) for length in shape], strides, number(size), None)
+            return array._getvalue()
+
+        return kind(), generate
+
+    return room
+
+
+matrix, vector = on_stack(3, 3), on_stack(3)
+"""Room for a rotation, and for a point or direction."""
 
 COMPILED = ("geometry.py", "hand", "objects", "sensing", "network", "ik", "body_track.py", "forecast.py")
 """Where compiled functions are, and the constants they are compiled with; nothing else is part of the state."""

@@ -7,13 +7,13 @@ solved again so that the joints keep their distance to the new surface.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import MIRROR, Array, quat_rotate, quat_to_matrix
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.ik.least_squares import solve_least_squares
-from manipnet.kernels import kernel
 from manipnet.objects.mesh import closed_mesh
 from manipnet.objects.shape import Shape, build_shape
 from manipnet.sensing.scene import object_from_wrist
@@ -92,7 +92,7 @@ def _solve(hand: HandTrack, targets: Array) -> Array:
     return hand.angles + gaussian_filter1d(solved - hand.angles, _FINGER_SMOOTHING, axis=0)
 
 
-@kernel
+@njit(cache=True, nogil=True, error_model="numpy")
 def _solve_frames(angles, targets, wrist, obj, mirrored, limits, field):
     rotation, translation = np.empty((3, 3)), np.empty(3)
     local, identity = np.empty((22, 3)), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])

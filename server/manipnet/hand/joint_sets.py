@@ -15,7 +15,7 @@ import numpy as np
 from manipnet.geometry import Array, matrix_to_quat, mirror_quats
 from manipnet.hand.kinematics import forward_kinematics, forward_kinematics_into
 from manipnet.hand.skeleton import BONE_COUNT, DOF_AXES, DOF_COUNT, DOF_JOINTS, DOF_NAMES, FINGER_JOINTS, PARENTS
-from manipnet.kernels import inner, kernel
+from manipnet.kernels import inner, kernel, on_stack, vector
 
 Side = Literal["left", "right"]
 
@@ -55,6 +55,9 @@ _MIDDLE_KNUCKLE = FINGER_JOINTS[2][0]
 # The joints of ours behind thumb and fingers. The thumb's metacarpal is bone 2, which both carpal angles have turned.
 _JOINTS = np.array([0, 0, *FINGER_JOINTS[0][1:], *(j for chain in FINGER_JOINTS[1:] for j in (0, *chain))])
 _BONES = np.where(_JOINTS < BONE_COUNT, _JOINTS, PARENTS[_JOINTS])
+
+_positions, _rotations, _axes = on_stack(22, 3), on_stack(BONE_COUNT, 3, 3), on_stack(DOF_COUNT, 3)
+_quats, _quat = on_stack(BONE_COUNT, 4), on_stack(4)
 
 
 def pose_in_world(sides: Sequence[Side], angles: Array, T_world_wrist: Array, scale: float) -> tuple[Array, Array]:
@@ -115,8 +118,8 @@ def _quat_into(m, mirrored, out):
 
 @kernel
 def _pose_in_world(angles, wrists, left, scale, offsets, local, joints):
-    positions, rotations, axes = np.empty((22, 3)), np.empty((17, 3, 3)), np.empty((20, 3))
-    quats, turned, point = np.empty((17, 4)), np.empty(4), np.empty(3)
+    positions, rotations, axes = _positions(), _rotations(), _axes()
+    quats, turned, point = _quats(), _quat(), vector()
     for n in range(len(angles)):
         forward_kinematics_into(angles[n], positions, rotations, axes)
         for bone in range(BONE_COUNT):

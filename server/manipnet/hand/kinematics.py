@@ -17,8 +17,9 @@ from manipnet.hand.skeleton import (
     PARENTS,
     REST_QUATS,
 )
-from manipnet.kernels import inner, kernel
+from manipnet.kernels import inner, kernel, matrix, on_stack
 
+_axes = on_stack(DOF_COUNT, 3)
 _REST = quat_to_matrix(REST_QUATS)
 _FIRST_DOF = np.array([int(np.argmax(j == DOF_JOINTS)) if j in DOF_JOINTS else -1 for j in range(BONE_COUNT)])
 _DOFS_OF_BONE = np.array([int(np.sum(j == DOF_JOINTS)) for j in range(BONE_COUNT)])
@@ -69,7 +70,7 @@ def _apply_offset_into(parent_position, parent_rotation, offset, out):
 @inner
 def forward_kinematics_into(angles, positions, rotations, axes):
     """Pose of one hand: `angles (20,)` into `positions (22, 3)`, `rotations (17, 3, 3)`, hinge `axes (20, 3)`."""
-    hinge, turned = np.empty((3, 3)), np.empty((3, 3))
+    hinge, turned = matrix(), matrix()
     positions[0] = 0.0
     set_identity(rotations[0])
     for bone in range(1, BONE_COUNT):
@@ -118,7 +119,7 @@ def _turn_about(u, v, m):
 @inner
 def angles_from_rotations_into(rotations, angles):
     """The 20 angles whose hand is nearest to bone `rotations (17, 3, 3)`, joint by joint, into `angles (20,)`."""
-    local, work, back = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    local, work, back = matrix(), matrix(), matrix()
     for bone in range(1, BONE_COUNT):
         parent = rotations[PARENTS[bone]]
         for i in range(3):
@@ -145,7 +146,7 @@ def angles_from_rotations_into(rotations, angles):
 
 @kernel
 def _forward_batch(angles, positions, rotations):
-    axes = np.empty((DOF_COUNT, 3))
+    axes = _axes()
     for i in range(len(angles)):
         forward_kinematics_into(angles[i], positions[i], rotations[i], axes)
 

@@ -1,16 +1,15 @@
 """Inverse kinematics of one hand at one tick: targets, a solver, and corrections that fade in and out."""
 
-import numpy as np
-
 from manipnet.ik.ccd import solve_ccd
 from manipnet.ik.chains import clamp
 from manipnet.ik.grip import hold_share
 from manipnet.ik.least_squares import solve_least_squares
 from manipnet.ik.targets import place_targets
-from manipnet.kernels import inner
+from manipnet.kernels import inner, matrix, on_stack, vector
 from manipnet.network.layout import PRESENT
 from manipnet.sensing.scene import object_from_wrist
 
+_targets = on_stack(22, 3)
 FADE_SHARE = 0.5
 """How much of the way to a new correction one tick goes: no popping."""
 
@@ -32,7 +31,7 @@ def correct_by_least_squares(
     `wrist` and `obj` are windows `(21, 7)` of the scene the network sees; `correction (20,)` is carried from
     tick to tick.
     """
-    rotation, translation, targets = np.empty((3, 3)), np.empty(3), np.empty((22, 3))
+    rotation, translation, targets = matrix(), vector(), _targets()
     object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
     place_targets(solid, rotation, translation, scale, positions, distances, targets)
     hold = hold_share(wrist, obj)
@@ -43,7 +42,7 @@ def correct_by_least_squares(
 @inner
 def correct_by_ccd(solid, wrist, obj, mirrored, scale, positions, distances, limits, predicted, angles, correction):
     """The same with the paper's solver."""
-    rotation, translation, targets = np.empty((3, 3)), np.empty(3), np.empty((22, 3))
+    rotation, translation, targets = matrix(), vector(), _targets()
     object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
     place_targets(solid, rotation, translation, scale, positions, distances, targets)
     solve_ccd(predicted, targets, limits, angles)

@@ -7,7 +7,7 @@ of such frames. Then the thumb and whichever fingers are nearest belong on its s
 import numpy as np
 
 from manipnet.ik.chains import CAPSULE_ENDS, CAPSULE_RADII, CAPSULE_STARTS, CAPSULES, FINGERS
-from manipnet.kernels import inner
+from manipnet.kernels import inner, matrix, on_stack, vector
 from manipnet.sensing.scene import quat_to_matrix_into
 
 ARM_M = 0.05
@@ -21,13 +21,13 @@ TOGETHER, APART = 0.6, 1.0
 TAKES_PART_M = 0.010
 """A finger predicted to be this much farther from the object than the nearest one is left out of the grip."""
 _POINTS = 4
+_points = on_stack(_POINTS, 3)
 
 
 @inner
 def hold_share(wrist, obj):
     """How sure it is, 0 to 1, that the hand with poses `wrist (21, 7)` holds the object with poses `obj (21, 7)`."""
-    w, o = np.empty((3, 3)), np.empty((3, 3))
-    apart, first, first_seen = np.empty(3), np.empty((_POINTS, 3)), np.empty((_POINTS, 3))
+    w, o, apart, first, first_seen = matrix(), matrix(), vector(), _points(), _points()
     moved = seen_moved = 0.0
     for t in range(FIRST, LAST):
         quat_to_matrix_into(wrist[t, 3:], w)

@@ -20,7 +20,7 @@ from manipnet.ik.chains import (
     dof_moves,
 )
 from manipnet.ik.grip import grip_into
-from manipnet.kernels import inner
+from manipnet.kernels import inner, on_stack
 from manipnet.objects.field import field_distance
 from manipnet.sensing.scene import map_direction_back, map_point
 
@@ -43,6 +43,8 @@ GRIP_SHARE = 0.7
 GRIP_REACH_M = 0.030
 """How far away the surface may be that they are pulled onto."""
 _MAX_STEP_RAD = 0.2
+_positions, _rotations, _axes = on_stack(22, 3), on_stack(BONE_COUNT, 3, 3), on_stack(DOF_COUNT, 3)
+_square, _columns, _numbers, _grip = on_stack(DOFS, DOFS), on_stack(DOFS, 3), on_stack(DOFS), on_stack(FINGERS)
 
 
 @inner
@@ -53,12 +55,13 @@ def _jacobian_column(axis, origin, x, y, z):
 
 @inner
 def _add_targets(finger, positions, axes, targets, normal, slope):
+    columns = _columns()
     for j in MOVED_JOINTS[finger]:
         if j < 0:
             continue
-        columns = np.zeros((DOFS, 3))
         for k in range(DOFS):
             dof = DOFS * finger + k
+            columns[k, 0] = columns[k, 1] = columns[k, 2] = 0.0
             if dof_moves(dof, PARENTS[j]):
                 x, y, z = _jacobian_column(
                     axes[dof], positions[DOF_JOINTS[dof]], positions[j, 0], positions[j, 1], positions[j, 2]
@@ -74,7 +77,7 @@ def _add_targets(finger, positions, axes, targets, normal, slope):
 
 @inner
 def _add_surface(finger, positions, axes, distances, grip, field, rotation, translation, scale, normal, slope):
-    row = np.empty(DOFS)
+    row = _numbers()
     reach = PULL_REACH_M + grip * (GRIP_REACH_M - PULL_REACH_M)
     for c in CAPSULES[finger]:
         start, end, radius = CAPSULE_STARTS[c], CAPSULE_ENDS[c], CAPSULE_RADII[c]
@@ -131,9 +134,8 @@ def solve_least_squares(start, targets, distances, hold, limits, field, rotation
     the object, and onto it where predicted `distances (22,)` or the share `hold` of a grip say so."""
     for dof in range(DOF_COUNT):
         angles[dof] = start[dof]
-    positions, rotations = np.empty((22, 3)), np.empty((BONE_COUNT, 3, 3))
-    axes = np.empty((DOF_COUNT, 3))
-    normal, slope, grip = np.empty((DOFS, DOFS)), np.empty(DOFS), np.empty(FINGERS)
+    positions, rotations, axes = _positions(), _rotations(), _axes()
+    normal, slope, grip = _square(), _numbers(), _grip()
     grip_into(distances, hold, grip)
     for _ in range(ITERATIONS):
         forward_kinematics_into(angles, positions, rotations, axes)

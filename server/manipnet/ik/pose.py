@@ -11,7 +11,7 @@ from manipnet.geometry import Array
 from manipnet.hand.kinematics import forward_kinematics_into
 from manipnet.hand.skeleton import BONE_COUNT, DOF_COUNT, JOINT_COUNT
 from manipnet.ik.correct import correct_by_ccd, correct_by_least_squares
-from manipnet.kernels import inner, kernel
+from manipnet.kernels import inner, kernel, on_stack
 from manipnet.network.decode import decode_into
 
 SolverName = Literal["least_squares", "ccd", "none"]
@@ -47,6 +47,9 @@ def room_for_poses(count: int) -> Poses:
     )
 
 
+_axes, _angles = on_stack(DOF_COUNT, 3), on_stack(DOF_COUNT)
+
+
 @inner
 def _predict(output, before, response, limits, axes, n, poses, predicted):
     """What the network alone says of hand `n`: its angles into `predicted (20,)`, raw positions and distances."""
@@ -58,7 +61,7 @@ def _predict(output, before, response, limits, axes, n, poses, predicted):
 def pose_by_least_squares(solid, windows, outputs, before, response, limits, first, last, poses):
     """Pose hands `first … last - 1`, all about `solid`, as the network's `outputs (N, 220)` and the angles
     `before (N, 20)` of the last tick say."""
-    axes, predicted = np.empty((20, 3)), np.empty(20)
+    axes, predicted = _axes(), _angles()
     for n in range(first, last):
         angles = poses.angles[n]
         _predict(outputs[n], before[n], response, limits, axes, n, poses, predicted)
@@ -81,7 +84,7 @@ def pose_by_least_squares(solid, windows, outputs, before, response, limits, fir
 @kernel
 def pose_by_ccd(solid, windows, outputs, before, response, limits, first, last, poses):
     """The same with the paper's solver."""
-    axes, predicted = np.empty((20, 3)), np.empty(20)
+    axes, predicted = _axes(), _angles()
     for n in range(first, last):
         angles = poses.angles[n]
         _predict(outputs[n], before[n], response, limits, axes, n, poses, predicted)
@@ -104,7 +107,7 @@ def pose_by_ccd(solid, windows, outputs, before, response, limits, first, last, 
 @kernel
 def pose_as_predicted(solid, windows, outputs, before, response, limits, first, last, poses):
     """The same without inverse kinematics."""
-    axes = np.empty((20, 3))
+    axes = _axes()
     for n in range(first, last):
         _predict(outputs[n], before[n], response, limits, axes, n, poses, poses.angles[n])
         forward_kinematics_into(poses.angles[n], poses.positions[n], poses.rotations[n], axes)

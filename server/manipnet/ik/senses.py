@@ -7,7 +7,7 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.hand.skeleton import JOINT_COUNT
 from manipnet.ik.targets import place_targets
-from manipnet.kernels import kernel
+from manipnet.kernels import kernel, matrix, vector
 from manipnet.objects.shape import Shape
 from manipnet.sensing.ambient import CELLS, sense_ambient
 from manipnet.sensing.proximity import SENSOR_COUNT, SENSORS, aim_rays, place_sensors, read_rays, room_for_rays
@@ -57,7 +57,7 @@ def present_senses(
 
 @kernel
 def _present(sensors, solid, wrist, obj, mirrored, scale, positions, rotations, raw_positions, distances, rays, senses):
-    rotation, translation = np.empty((3, 3)), np.empty(3)
+    rotation, translation = matrix(), vector()
     object_from_wrist(wrist, obj, mirrored, rotation, translation)
     sense_ambient(solid.field, rotation, translation, scale, senses.ambient)
     place_sensors(sensors, positions, rotations, senses.points, senses.normals)

@@ -4,9 +4,10 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.hand.kinematics import angles_from_rotations_into, set_identity
-from manipnet.kernels import inner, kernel
+from manipnet.kernels import inner, kernel, on_stack
 from manipnet.network.layout import OUTPUT, OUTPUT_DISTANCE_MAX_M
 
+_distances, _rotations = on_stack(22), on_stack(17, 3, 3)
 _AXES, _DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
 
 
@@ -51,7 +52,7 @@ def decode_into(output, before, response, limits, rotations, angles, distances):
 
 @kernel
 def _decode_batch(outputs, limits, angles):
-    distances, rotations = np.empty(22), np.empty((17, 3, 3))
+    distances, rotations = _distances(), _rotations()
     for n in range(len(outputs)):
         decode_into(outputs[n], limits[:, 0], 1.0, limits, rotations, angles[n], distances)
 

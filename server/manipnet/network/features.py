@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.kernels import inner, kernel
+from manipnet.kernels import inner, kernel, matrix, on_stack, vector
 from manipnet.network.layout import (
     INPUT,
     INPUT_SIZE,
@@ -34,6 +34,7 @@ _PROXIMITY = INPUT["proximity"].start
 _DISTANCES, _NORMALS = INPUT["signed_distances"].start, INPUT["surface_normals"].start
 _OUT_AXES, _OUT_DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
 _WINDOW, _SENSED_COUNT = 21, len(SENSED)
+_joint_numbers, _joint_vectors, _sensor_vectors = on_stack(22), on_stack(22, 3), on_stack(SENSOR_COUNT, 3)
 
 
 class Windows(NamedTuple):
@@ -100,7 +101,7 @@ def joint_distances(shape: Shape, windows: Windows, positions: Array) -> Array:
 
 @kernel
 def _present_distances(solid, windows, positions, distances):
-    rotation, translation, normals = np.empty((3, 3)), np.empty(3), np.empty((22, 3))
+    rotation, translation, normals = matrix(), vector(), _joint_vectors()
     for n in range(len(positions)):
         object_from_wrist(
             windows.wrist[n, PRESENT], windows.object[n, PRESENT], windows.mirrored[n], rotation, translation
@@ -138,8 +139,7 @@ def _rotation_vector_into(m, out):
 
 @inner
 def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
-    w0, w, o = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    before, turn, spin, center = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    w0, w, o, before, turn, spin, center = matrix(), matrix(), matrix(), matrix(), matrix(), vector(), vector()
     quat_to_matrix_into(wrist[PRESENT, 3:], w0)
     origin = wrist[PRESENT]
     for t in range(_WINDOW):
@@ -183,9 +183,9 @@ def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
 @kernel
 def _all_but_readings(sensors, solid, windows, positions, rotations, first, last, rays, rows):
     """Every block of some rows but the readings of rays that have to be traced; returns how many these are."""
-    rotation, translation = np.empty((3, 3)), np.empty(3)
-    points, directions = np.empty((SENSOR_COUNT, 3)), np.empty((SENSOR_COUNT, 3))
-    distances, normals = np.empty(22), np.empty((22, 3))
+    rotation, translation = matrix(), vector()
+    points, directions = _sensor_vectors(), _sensor_vectors()
+    distances, normals = _joint_numbers(), _joint_vectors()
     box, traced = solid.bvh.boxes[0], 0
     _pose_rows(positions, rotations, first, last, rows)
     for n in range(first, last):

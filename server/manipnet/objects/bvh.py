@@ -8,9 +8,10 @@ and Aanæs 2005), exact on closed meshes.
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
 
 from manipnet.geometry import Array
-from manipnet.kernels import inner
+from manipnet.kernels import inner, on_stack
 
 _BINS = 12
 _LEAF_TRIANGLES = 3
@@ -19,6 +20,7 @@ _BINNED_LEVELS = 48
 _MOST_LEVELS = _BINNED_LEVELS + 24
 _STACK = 96
 """Room for a walk down any tree, one node waiting per level."""
+_nodes, _numbers = on_stack(_STACK, dtype=types.int32), on_stack(_STACK)
 
 
 class Bvh(NamedTuple):
@@ -201,7 +203,7 @@ def closest_point(bvh, px, py, pz, seed):
         bx, by, bz, region = _closest_on_triangle(px, py, pz, corners, seed)
         best = (px - bx) ** 2 + (py - by) ** 2 + (pz - bz) ** 2
         triangle = seed
-    stack, near = np.empty(_STACK, np.int32), np.empty(_STACK)
+    stack, near = _nodes(), _numbers()
     stack[0], near[0], depth = 0, 0.0, 1
     while depth > 0:
         depth -= 1
@@ -240,7 +242,7 @@ def trace_ray(bvh, ox, oy, oz, dx, dy, dz):
     iy = 1.0 / dy if dy != 0.0 else np.inf
     iz = 1.0 / dz if dz != 0.0 else np.inf
     best, triangle = np.inf, -1
-    stack = np.empty(_STACK, np.int32)
+    stack = _nodes()
     stack[0], depth = 0, 1
     while depth > 0:
         depth -= 1

@@ -1,8 +1,6 @@
 """Where things are, as the kernels see them: one hand's window in its own wrist frame, as if it were a right hand."""
 
-import numpy as np
-
-from manipnet.kernels import inner
+from manipnet.kernels import inner, matrix
 
 SENSOR_RANGE_M = 0.10
 """Where proximity and signed distances saturate (paper, section 5.2)."""
@@ -24,7 +22,7 @@ def object_from_wrist(wrist, obj, mirrored, rotation, translation):
     `wrist` and `obj` are poses `(7,)` of the scene as the network sees it; in a mirrored scene the object is its mirror
     image, so the map ends with a reflection. `rotation (3, 3)` and `translation (3,)` are written.
     """
-    w, o = np.empty((3, 3)), np.empty((3, 3))
+    w, o = matrix(), matrix()
     quat_to_matrix_into(wrist[3:], w)
     quat_to_matrix_into(obj[3:], o)
     for i in range(3):
