@@ -16,12 +16,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 from manipnet.actor import ShownHand
 from manipnet.geometry import Array, quat_exp, quat_multiply
 from manipnet.messages import hand_poses
+from manipnet.hand.kinematics import forward_kinematics
+from manipnet.ik.pose import FELT_SHARE
 from manipnet.network.bundle import Bundle, load_bundle
 from manipnet.network.features import features
 from manipnet.network.layout import INPUT, PRESENT, WINDOW_OFFSETS_S
 from manipnet.objects.shape import Shape, build_shape
 from manipnet.presence import Shown
-from manipnet.synthesis import HandScene, HandState, Synthesizer, windows_of
+from manipnet.synthesis import HandScene, HandState, HandStep, Synthesizer, windows_of
 from manipnet_tools.bench.shapes import gourd
 from tiny_bundle import write_tiny_bundle
 
@@ -80,19 +82,19 @@ def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
         ticks.append(
             {
                 "features": rows,
-                "angles": [state.angles for state in states],
-                "positions": [state.positions for state in states],
+                "angles": [step.angles for step in steps],
+                "positions": [step.positions for step in steps],
                 "raw_positions": [step.raw_positions for step in steps],
                 "distances": [step.distances for step in steps],
             }
-            | _in_world(scenes, states)
+            | _in_world(scenes, steps)
         )
     return {name: np.array([tick[name] for tick in ticks], dtype=np.float32) for name in ticks[0]}
 
 
-def _in_world(scenes: list[HandScene], states: list[HandState]) -> dict[str, list[np.ndarray]]:
+def _in_world(scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
     """What clients get of each hand, its size a little off."""
-    shown = [Shown("live", state.angles, scene.wrist[PRESENT]) for scene, state in zip(scenes, states, strict=True)]
+    shown = [Shown("live", step.angles, scene.wrist[PRESENT]) for scene, step in zip(scenes, steps, strict=True)]
     pairs = [(scene.side, ShownHand(hand, None)) for scene, hand in zip(scenes, shown, strict=True)]
     poses = list(hand_poses(dict(pairs[:2]), 1.1).values()) + list(hand_poses(dict(pairs[2:]), 1.1).values())
     return {"joints": [pose.joints for pose in poses], "local_rotations": [pose.rotations for pose in poses]}
@@ -141,7 +143,18 @@ def test_a_hand_does_not_depend_on_its_batch(tiny_bundle: Path, tmp_path: Path) 
     together = synthesizer.step(scenes, [rest] * len(scenes))
     for scene, step in zip(scenes, together, strict=True):
         alone = synthesizer.step([scene], [rest])[0]
-        np.testing.assert_allclose(step.state.angles, alone.state.angles, rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(step.angles, alone.angles, rtol=0.0, atol=1e-6)
+
+
+def test_the_next_tick_sees_part_of_the_correction(tiny_bundle: Path, tmp_path: Path) -> None:
+    shapes = [build_shape(gourd(triangles), tmp_path) for triangles in (2000, 300)]
+    synthesizer = Synthesizer(load_bundle(tiny_bundle))
+    step = synthesizer.step(scenes_at(0, shapes), [synthesizer.rest_state()] * 3)[0]
+    predicted = (step.state.angles - FELT_SHARE * step.angles) / (1.0 - FELT_SHARE)
+    assert np.abs(step.angles - predicted).max() > 0.01, "the solver has work to do"
+    np.testing.assert_allclose(forward_kinematics(predicted)[0], step.raw_positions, atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(step.angles)[0], step.positions, atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(step.state.angles)[0], step.state.positions, atol=1e-9)
 
 
 if __name__ == "__main__":

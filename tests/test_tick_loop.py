@@ -174,7 +174,7 @@ class Faulty:
             if self._how == "raise":
                 raise RuntimeError("the network is on fire")
             for step in steps:
-                step.state.angles[3] = np.nan
+                step.angles[3] = step.state.angles[3] = np.nan
         return steps
 
 

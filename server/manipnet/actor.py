@@ -57,7 +57,7 @@ class Hand:
         """The hand `dt_s` after the last tick: live with a `step`, else held or on its way to rest."""
         if state == "live" and step is None:
             state = "hold"
-        angles = None if step is None else step.state.angles
+        angles = None if step is None else step.angles
         if state == "rest":
             self.prop = None
         shown = self._presence.show(state, angles, wrist, run, self.prop, dt_s, known)

@@ -51,7 +51,8 @@ class HandScene:
 
 @dataclass(frozen=True, eq=False)
 class HandState:
-    """What a hand carries from tick to tick: its pose in its own wrist frame, as a right hand."""
+    """What a hand carries from tick to tick: the pose it feels itself in, which is what it shows but for part of the
+    last correction; in its own wrist frame, as a right hand."""
 
     angles: Array
     """`(20,)` radians."""
@@ -68,6 +69,12 @@ class HandStep:
     """The pose of one hand at one tick, in its own wrist frame, as a right hand."""
 
     state: HandState
+    angles: Array
+    """`(20,)` radians."""
+    positions: Array
+    """`(22, 3)` metres."""
+    rotations: Array
+    """`(17, 3, 3)`."""
     distances: Array
     """`(22,)` joint to surface as predicted, metres, in [0, 0.035]."""
     raw_positions: Array
@@ -198,5 +205,5 @@ def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
-    for angles, positions, rotations, correction, distances, raw_positions in zip(*poses, strict=True):
-        yield HandStep(HandState(angles, positions, rotations, correction), distances, raw_positions)
+    for angles, positions, rotations, correction, distances, raw_positions, *felt in zip(*poses, strict=True):
+        yield HandStep(HandState(*felt, correction), angles, positions, rotations, distances, raw_positions)

@@ -175,9 +175,9 @@ def roll_out(
 
 def _motion(steps: list[HandStep]) -> HandMotion:
     return HandMotion(
-        np.stack([step.state.angles for step in steps]),
-        np.stack([step.state.positions for step in steps]),
-        np.stack([step.state.rotations for step in steps]),
+        np.stack([step.angles for step in steps]),
+        np.stack([step.positions for step in steps]),
+        np.stack([step.rotations for step in steps]),
         np.stack([step.distances for step in steps]),
         np.stack([step.raw_positions for step in steps]),
     )

@@ -16,6 +16,9 @@ from manipnet.network.decode import decode_into
 
 SolverName = Literal["least_squares", "ccd", "none"]
 SOLVERS: tuple[SolverName, ...] = ("least_squares", "ccd", "none")
+FELT_SHARE = 0.5
+"""How much of its corrections the network sees of its own hand: with all of them it strays from the poses it has learned,
+with none it does not know what it holds (docs/results.md, Ideas tried)."""
 
 
 class Poses(NamedTuple):
@@ -33,6 +36,10 @@ class Poses(NamedTuple):
     """`(N, 22)` joint to surface as predicted, metres, in [0, 0.035]."""
     raw_positions: Array
     """`(N, 22, 3)` before inverse kinematics."""
+    felt_angles: Array
+    """`(N, 20)` the hand as the network is to see it at the next tick, with `FELT_SHARE` of the correction."""
+    felt_positions: Array
+    felt_rotations: Array
 
 
 def room_for_poses(count: int) -> Poses:
@@ -44,6 +51,9 @@ def room_for_poses(count: int) -> Poses:
         np.empty((count, DOF_COUNT)),
         np.empty((count, JOINT_COUNT)),
         np.empty((count, JOINT_COUNT, 3)),
+        np.empty((count, DOF_COUNT)),
+        np.empty((count, JOINT_COUNT, 3)),
+        np.empty((count, BONE_COUNT, 3, 3)),
     )
 
 
@@ -55,6 +65,16 @@ def _predict(output, before, response, limits, axes, n, poses, predicted):
     """What the network alone says of hand `n`: its angles into `predicted (20,)`, raw positions and distances."""
     decode_into(output, before, response, limits, poses.rotations[n], predicted, poses.distances[n])
     forward_kinematics_into(predicted, poses.raw_positions[n], poses.rotations[n], axes)
+
+
+@inner
+def _settle(predicted, axes, n, poses):
+    """Joints of hand `n` from its corrected angles, and the hand as the network is to see it."""
+    angles, felt = poses.angles[n], poses.felt_angles[n]
+    forward_kinematics_into(angles, poses.positions[n], poses.rotations[n], axes)
+    for dof in range(DOF_COUNT):
+        felt[dof] = predicted[dof] + FELT_SHARE * (angles[dof] - predicted[dof])
+    forward_kinematics_into(felt, poses.felt_positions[n], poses.felt_rotations[n], axes)
 
 
 @kernel
@@ -78,7 +98,7 @@ def pose_by_least_squares(solid, windows, outputs, before, response, limits, fir
             angles,
             poses.correction[n],
         )
-        forward_kinematics_into(angles, poses.positions[n], poses.rotations[n], axes)
+        _settle(predicted, axes, n, poses)
 
 
 @kernel
@@ -101,7 +121,7 @@ def pose_by_ccd(solid, windows, outputs, before, response, limits, first, last, 
             angles,
             poses.correction[n],
         )
-        forward_kinematics_into(angles, poses.positions[n], poses.rotations[n], axes)
+        _settle(predicted, axes, n, poses)
 
 
 @kernel
@@ -110,7 +130,7 @@ def pose_as_predicted(solid, windows, outputs, before, response, limits, first, 
     axes = _axes()
     for n in range(first, last):
         _predict(outputs[n], before[n], response, limits, axes, n, poses, poses.angles[n])
-        forward_kinematics_into(poses.angles[n], poses.positions[n], poses.rotations[n], axes)
+        _settle(poses.angles[n], axes, n, poses)
 
 
 POSERS = {"least_squares": pose_by_least_squares, "ccd": pose_by_ccd, "none": pose_as_predicted}
