@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from manipnet.actor import ShownHand
 from manipnet.geometry import Array, quat_exp, quat_multiply
-from manipnet.messages import hand_poses
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.ik.pose import FELT_SHARE
+from manipnet.messages import hand_poses
 from manipnet.network.bundle import Bundle, load_bundle
 from manipnet.network.features import features
 from manipnet.network.layout import INPUT, PRESENT, WINDOW_OFFSETS_S

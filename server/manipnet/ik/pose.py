@@ -17,8 +17,8 @@ from manipnet.network.decode import decode_into
 SolverName = Literal["least_squares", "ccd", "none"]
 SOLVERS: tuple[SolverName, ...] = ("least_squares", "ccd", "none")
 FELT_SHARE = 0.5
-"""How much of its corrections the network sees of its own hand: with all of them it strays from the poses it has learned,
-with none it does not know what it holds (docs/results.md, Ideas tried)."""
+"""How much of its corrections the network sees of its own hand: with all of them it strays from the poses it has
+learned, with none it does not know what it holds (docs/results.md, Ideas tried)."""
 
 
 class Poses(NamedTuple):
