@@ -31,7 +31,7 @@ inner = njit(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=Tru
 the compiling."""
 
 
-def on_stack(*shape: int, dtype=types.float64) -> Callable[[], Any]:
+def on_stack(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
     """A function for kernels that gives an array of this shape to work in, unfilled and gone when they return.
 
     One place for each call in the source, so an array made in a loop is the same one every time round.

@@ -96,11 +96,11 @@ def _cross(a: Array, b: Array) -> Array:
 @inner
 def field_distance(field, px, py, pz):
     """Trilinear signed distance and its gradient at one point: `(distance, gx, gy, gz)`; clamped outside the grid."""
-    d, cell = field.distance, field.cell_m
+    d, per_m = field.distance, 1.0 / field.cell_m
     nx, ny, nz = d.shape
-    x = min(max((px - field.origin[0]) / cell, 0.0), nx - 1.000001)
-    y = min(max((py - field.origin[1]) / cell, 0.0), ny - 1.000001)
-    z = min(max((pz - field.origin[2]) / cell, 0.0), nz - 1.000001)
+    x = min(max((px - field.origin[0]) * per_m, 0.0), nx - 1.000001)
+    y = min(max((py - field.origin[1]) * per_m, 0.0), ny - 1.000001)
+    z = min(max((pz - field.origin[2]) * per_m, 0.0), nz - 1.000001)
     i, j, k = int(x), int(y), int(z)
     u, v, w = x - i, y - j, z - k
     d000, d001, d010, d011 = d[i, j, k], d[i, j, k + 1], d[i, j + 1, k], d[i, j + 1, k + 1]
@@ -110,7 +110,7 @@ def field_distance(field, px, py, pz):
     d0, d1 = d00 + v * (d10 - d00), d01 + v * (d11 - d01)
     gx = (1 - v) * ((1 - w) * (d100 - d000) + w * (d101 - d001)) + v * ((1 - w) * (d110 - d010) + w * (d111 - d011))
     gy = (1 - w) * (d10 - d00) + w * (d11 - d01)
-    return d0 + w * (d1 - d0), gx / cell, gy / cell, (d1 - d0) / cell
+    return d0 + w * (d1 - d0), gx * per_m, gy * per_m, (d1 - d0) * per_m
 
 
 @inner

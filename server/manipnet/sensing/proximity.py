@@ -74,7 +74,7 @@ def aim_rays(box, rotation, translation, scale, points, normals, row, readings, 
     A ray that cannot reach the object's `box (6,)` reads its full range: that is written into `readings` from
     `first_column` on, and the ray left out. `row` and column are noted with the others.
     """
-    reach = SENSOR_RANGE_M / scale
+    reach, size = SENSOR_RANGE_M / scale, 1.0 / scale
     for s in range(SENSOR_COUNT):
         column = first_column + s
         readings[column] = SENSOR_RANGE_M
@@ -84,14 +84,15 @@ def aim_rays(box, rotation, translation, scale, points, normals, row, readings, 
             for j in range(3):
                 p += rotation[i, j] * points[s, j]
                 d += rotation[i, j] * normals[s, j]
-            p /= scale
+            p *= size
             rays.origins[count, i], rays.directions[count, i] = p, d
             below, above = box[i] - _ROUNDING_M - p, box[3 + i] + _ROUNDING_M - p
             if abs(d) < 1e-9:
                 if below > 0.0 or above < 0.0:
                     leave = -1.0
             else:
-                near, far = below / d, above / d
+                per_m = 1.0 / d
+                near, far = below * per_m, above * per_m
                 enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
         if enter <= leave:
             rays.places[count, 0], rays.places[count, 1] = row, column

@@ -37,10 +37,11 @@ def object_from_wrist(wrist, obj, mirrored, rotation, translation):
 @inner
 def map_point(rotation, translation, scale, x, y, z):
     """A point in wrist coordinates to the object's own coordinates."""
+    size = 1.0 / scale  # the same for many points: one division for all of them
     return (
-        (rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]) / scale,
-        (rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]) / scale,
-        (rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]) / scale,
+        (rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]) * size,
+        (rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]) * size,
+        (rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]) * size,
     )
 
 
