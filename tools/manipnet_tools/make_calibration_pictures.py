@@ -1,4 +1,5 @@
-"""Picture of docs/calibration.md, and the printable sheet: `python -m manipnet_tools.make_calibration_pictures`."""
+"""Pictures of docs/calibration.md and of the page, and the printable sheet:
+`python -m manipnet_tools.make_calibration_pictures`."""
 
 from pathlib import Path
 from typing import Any, Final
@@ -8,10 +9,11 @@ import numpy as np
 from manipnet.calibration import HAND_LENGTH_M, MARK_M, wrist_on_sheet
 from manipnet.geometry import Array, mirror_points, transform
 from manipnet.hand.kinematics import forward_kinematics
-from manipnet.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M
+from manipnet.hand.surface import FACES, skin
 from manipnet.synthesis import Side
 
-IMAGES: Final = Path(__file__).parents[2] / "docs" / "images"
+HOUSE: Final = Path(__file__).parents[2]
+IMAGES, PAGE = HOUSE / "docs" / "images", HOUSE / "server" / "manipnet" / "page"
 PAPER: Final = (0.42, 0.297)
 """A3, landscape, metres."""
 TABLE_M: Final = 0.56
@@ -19,13 +21,17 @@ TABLE_M: Final = 0.56
 PIXELS: Final = 520
 FINE: Final = 3
 INK, GREY, RED, GREEN, BLUE = (25, 25, 30), (140, 140, 145), (190, 40, 30), (30, 130, 50), (30, 70, 190)
+LIGHT: Final = np.array([-0.35, 0.86, -0.37])
 SKINS: Final[dict[Side, tuple[int, int, int]]] = {"left": (214, 170, 150), "right": (228, 184, 158)}
 
 
 def main() -> None:
-    """Write both."""
+    """Write all."""
     from PIL import Image
 
+    near = [round(edge / FINE) for edge in (*_pixel(-0.235, -0.165), *_pixel(0.235, 0.275))]
+    panel(np.zeros(7)).crop(near).save(PAGE / "wrists.png")
+    panel(_drawn_back()).crop(near).save(PAGE / "fingertips.png")
     panels = [panel(np.zeros(7), "1  wrists on the marks"), panel(_drawn_back(), "2  fingertips on the centre line")]
     both = Image.new("RGB", (2 * PIXELS + 20, PIXELS), "white")
     for i, image in enumerate(panels):
@@ -34,7 +40,7 @@ def main() -> None:
     (IMAGES / "calibration-sheet.svg").write_text(sheet_svg(), encoding="utf-8")
 
 
-def panel(moved: Array, title: str) -> Any:
+def panel(moved: Array, title: str = "") -> Any:
     """The sheet with both hands `moved` from their marks, from above, the operator at the bottom edge."""
     from PIL import Image, ImageDraw, ImageFont
 
@@ -52,7 +58,7 @@ def panel(moved: Array, title: str) -> Any:
         draw.line([*_pixel(s * mark_x - 0.03, mark_z), *_pixel(s * mark_x + 0.03, mark_z)], fill=INK, width=2 * FINE)
         x, y = _pixel(s * mark_x, mark_z)
         draw.ellipse([x - 5 * FINE, y - 5 * FINE, x + 5 * FINE, y + 5 * FINE], outline=INK, width=2 * FINE)
-    for end, color, name in (((0.05, 0.0), RED, "x"), ((0.0, 0.05), BLUE, "z")):
+    for end, color, name in (((0.03, 0.0), RED, "x"), ((0.0, 0.05), BLUE, "z")):
         draw.line([*_pixel(0.0, 0.0), *_pixel(*end)], fill=color, width=3 * FINE)
         draw.text(_pixel(end[0] + 0.006, end[1] - 0.006), name, fill=color, font=font)
     x, y = _pixel(0.0, 0.0)
@@ -67,16 +73,20 @@ def _drawn_back() -> Array:
 
 
 def _draw_hand(draw: Any, side: Side, moved: Array) -> None:
-    """A flat hand as its capsules, and the marker cluster on its back."""
-    positions, _ = forward_kinematics(np.zeros(20))
+    """A flat hand, lit from above, and the marker cluster on its back."""
+    positions, rotations = forward_kinematics(np.zeros(20))
+    vertices, faces = skin(positions, rotations), FACES
     cluster = np.array([[-0.035, 0.02, 0.03], [-0.035, -0.02, 0.03], [0.0, 0.0, 0.03]])
     if side == "left":
-        positions, cluster = mirror_points(positions), mirror_points(cluster)
+        vertices, cluster, faces = mirror_points(vertices), mirror_points(cluster), FACES[:, ::-1]
     wrist = wrist_on_sheet(side) + moved
-    joints, markers = transform(wrist, positions), transform(wrist, cluster)
-    for grow_m, color in ((0.0012, INK), (0.0, SKINS[side])):  # the outline is a larger hand behind
-        for (start, end), radius in zip(CAPSULE_JOINTS, CAPSULE_RADII_M, strict=True):
-            _capsule(draw, joints[start], joints[end], radius + grow_m, color)
+    corners, markers = transform(wrist, vertices)[faces], transform(wrist, cluster)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    shades = 0.55 + 0.45 * normals @ LIGHT / np.linalg.norm(normals, axis=1)
+    for k in np.argsort(corners[:, :, 1].mean(axis=1)):  # the highest last
+        if normals[k, 1] > 0.0:
+            color = tuple(round(channel * shades[k]) for channel in SKINS[side])
+            draw.polygon([_pixel(x, z) for x, _, z in corners[k]], fill=color)
     for a, b in zip(markers, np.roll(markers, 1, axis=0), strict=True):
         _capsule(draw, a, b, 0.0015, INK)
     for marker in markers:
@@ -100,7 +110,7 @@ def sheet_svg() -> str:
     """The sheet at its own size on A3, landscape: millimetres, the operator at the bottom edge."""
     width, height = (1e3 * size for size in PAPER)
     cx, cy, x, z = width / 2, height / 2, 1e3 * MARK_M[0], 1e3 * MARK_M[1]
-    parts = [_line(0, cy, width, cy), _text(cx, cy - 3, "centre line (z = 0)"), _line(cx - 8, cy, cx + 8, cy, 1.2)]
+    parts = [_line(0, cy, width, cy), _text(cx - 60, cy - 3, "centre line"), _line(cx - 8, cy, cx + 8, cy, 1.2)]
     parts += [_line(cx, cy - 8, cx, cy + 8, 1.2), _line(cx, cy, cx + 40, cy, 1.0), _text(cx + 40, cy + 6, "+x")]
     parts += [_line(cx, cy, cx, cy + 40, 1.0), _text(cx + 6, cy + 46, "+z, to the operator")]
     for name, here in (("left", cx - x), ("right", cx + x)):
@@ -110,6 +120,7 @@ def sheet_svg() -> str:
         for centimetre in range(12, 24):
             at = cy + z - 10 * centimetre
             parts += [_line(here - 6, at, here + 6, at), _text(here + 10, at + 1.5, str(centimetre))]
+        parts += [_text(here + 26, cy + z - 10 * 12 + 1.5, "cm to the wrist")]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}mm" height="{height:g}mm" '
         f'viewBox="0 0 {width:g} {height:g}" font-family="sans-serif" font-size="4.5" text-anchor="middle">\n'

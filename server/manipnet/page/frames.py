@@ -11,12 +11,14 @@ from manipnet.streams.wire import HandsMessage, Side
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PropView:
-    """A prop: its body's name, its shape's name and hash, its size over the shape's."""
+    """A prop: its body's name, its shape's name and hash, its size over the shape's, and where on its body it sits."""
 
     name: str
     object: str
     content_hash: str
     scale: float
+    offset: Array
+    """T_body_prop `(7,)`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

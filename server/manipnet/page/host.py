@@ -17,9 +17,11 @@ from multiprocessing.connection import Connection
 from typing import Any, Final
 
 from manipnet.actor import Actor, Plan
+from manipnet.geometry import Array
 from manipnet.objects.shape import Shape
 from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.page.parcels import pack, unpack
+from manipnet.props import Prop
 from manipnet.streams.intake import ListenError
 from manipnet.streams.wire import HandsMessage
 from manipnet.synthesis import HandStep, Side
@@ -63,7 +65,7 @@ class LivePage:
         self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
     ) -> None:
         """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
-        props = tuple(PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale) for prop in actor.props)
+        props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
         windows = {name: body.window for name, body in tick.bodies.items()}
         frame = Frame(message, props, windows, {} if plan is None else _hands(actor, plan, steps))
         with self._news:
@@ -168,6 +170,10 @@ class LivePage:
         parcel = pack(what, content)
         with self._telling, contextlib.suppress(OSError, ValueError):  # it has ended; who listens to it notices
             ours.send_bytes(parcel)
+
+
+def _prop(prop: Prop, offset: Array) -> PropView:
+    return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
 
 
 def _hands(actor: Actor, plan: Plan, steps: Mapping[Side, HandStep]) -> dict[Side, HandView]:

@@ -18,10 +18,10 @@ from manipnet.streams.wire import Side
 
 LAYERS: Final = {
     "ambient": "Ambient sensor",
-    "proximity": "Proximity sensors",
+    "proximity": "Proximity",
     "contacts": "Contacts",
     "targets": "IK targets",
-    "ghost": "Look-ahead ghost",
+    "ghost": "Ghost ahead",
 }
 """Names of the layers, and what people call them."""
 SENSED: Final = ("ambient", "proximity", "contacts", "targets")

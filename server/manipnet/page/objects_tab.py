@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import viser
 
-from manipnet.geometry import quat_exp, quat_log
+from manipnet.config import SCALE_RANGE
+from manipnet.geometry import Array, quat_exp, quat_log
 from manipnet.objects.mesh import FORMATS, UNITS_M
+from manipnet.page.frames import Frame
+from manipnet.page.handles import Handles
 
 if TYPE_CHECKING:
     from manipnet.page.process import Page
@@ -21,17 +24,23 @@ Doing = Callable[[Callable[[], str | None]], None]
 class ObjectsTab:
     """Which body carries what, how large, and where on it."""
 
-    def __init__(self, page: "Page", gui: viser.GuiApi, doing: Doing) -> None:
-        self._page, self._doing = page, doing
+    def __init__(self, page: "Page", client: viser.ClientHandle, doing: Doing) -> None:
+        self._page, self._doing, gui = page, doing, client.gui
+        self._handles = Handles(client.scene, self._drag)
         self._carried: dict[str, dict[str, Any]] = {}
-        self._shown = ""
-        """The object the controls speak of."""
+        self._shown: dict[str, Any] | None = None
+        """What the controls say of the chosen body, as the server told it."""
         self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NONES)  # pyright: ignore
         self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Carries", NONES)  # pyright: ignore
-        self._scale = gui.add_slider("Size", 0.2, 3.0, 0.05, initial_value=1.0)
-        self._position = gui.add_vector3("Moved, mm", (0.0, 0.0, 0.0), step=1.0)
-        self._turn = gui.add_vector3("Turned, °", (0.0, 0.0, 0.0), step=1.0)
-        self._stand = gui.add_button("It stands on the sheet", icon=viser.Icon.ARROW_BAR_TO_DOWN)
+        self._scale = gui.add_slider("Size", *SCALE_RANGE, 0.05, initial_value=1.0)
+        self._position = gui.add_vector3("Moved, mm", (0.0, 0.0, 0.0), step=1.0, hint="x, y, z on its body")
+        self._turn = gui.add_vector3("Turned, °", (0.0, 0.0, 0.0), step=1.0, hint="about x, y, z of its body")
+        self._drags = gui.add_checkbox("By hand", False, hint="arrows and rings in the scene: drag the mesh into place")
+        self._stand = gui.add_button(
+            "It stands on the sheet",
+            icon=viser.Icon.ARROW_BAR_TO_DOWN,
+            hint="the prop stands upright on the calibration sheet's centre: find its place from that",
+        )
         self._unit = gui.add_dropdown("Unit of a file", tuple(UNITS_M), initial_value="m")
         self._upload = gui.add_upload_button(
             "Bring in a mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
@@ -45,9 +54,8 @@ class ObjectsTab:
             handle.on_update(self._by_visitor(lambda: self._doing(self._place)))
         self._upload.on_upload(lambda _: self._doing(self._bring_in))
 
-    def refresh(self) -> None:
-        """Offer what there is now."""
-        answer = self._page.link.ask(op="objects")
+    def refresh(self, answer: dict[str, Any]) -> None:
+        """Offer what there is now, as the server told it."""
         self._carried = {
             body if len(answer["bodies"]) == 1 else f"{actor}: {body}": {"actor": actor, "body": body, **prop}
             for actor, props in answer["bodies"].items()
@@ -61,14 +69,24 @@ class ObjectsTab:
         if self._body.options != bodies:
             self._body.options = bodies
             self._show_body()
-        elif self._carried and self._carried[self._body.value]["object"] != self._shown:  # swapped by a drop or another
+        elif self._carried.get(self._body.value) != self._shown:  # changed by a drop, the handles or somebody else
             self._show_body()
+
+    def follow(self, frame: Frame | None) -> None:
+        """Let the handles be where the chosen prop is at a tick."""
+        chosen = self._carried.get(self._body.value) if frame is not None and self._drags.value else None
+        if frame is None or chosen is None or chosen["actor"] != frame.message.actor:
+            self._handles.follow(None, None)
+            return
+        offset = next((prop.offset for prop in frame.props if prop.name == chosen["body"]), None)
+        pose = next((body.pose for body in frame.message.bodies if body.name == chosen["body"]), None)
+        self._handles.follow(pose, offset)
 
     def _show_body(self) -> None:
         prop = self._carried.get(self._body.value)
         if prop is None:
             return
-        self._shown = prop["object"]
+        self._shown = prop
         if prop["object"] in self._object.options:
             self._object.value = prop["object"]
         self._scale.value = min(max(prop["scale"], self._scale.min), self._scale.max)
@@ -86,9 +104,15 @@ class ObjectsTab:
         self._page.link.ask(op="select_object", object=self._object.value, scale=self._scale.value, **self._chosen())
 
     def _place(self) -> None:
-        rotation = quat_exp(np.radians(self._turn.value)).tolist()
-        position = [1e-3 * x for x in self._position.value]
-        self._page.link.ask(op="place_object", position=position, rotation=rotation, **self._chosen())
+        rotation = quat_exp(np.radians(self._turn.value))
+        self._put(np.concatenate([1e-3 * np.array(self._position.value), rotation]))
+
+    def _drag(self, offset: Array, last: bool) -> None:
+        self._doing(lambda: self._put(offset, last))
+
+    def _put(self, offset: Array, store: bool = True) -> None:
+        place = {"position": offset[:3].tolist(), "rotation": offset[3:].tolist(), "store": store}
+        self._page.link.ask(op="place_object", **place, **self._chosen())
 
     def _stand_on_sheet(self) -> None:
         self._page.link.ask(op="place_object", on_sheet=True, **self._chosen())

@@ -1,12 +1,13 @@
 """The panel of one visitor: how things stand for everybody, controls for those who may."""
 
 import math
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import viser
 
+from manipnet.page.calibrate_tab import CalibrateTab
+from manipnet.page.frames import Frame
 from manipnet.page.layers import LAYERS
 from manipnet.page.link import RefusedError
 from manipnet.page.objects_tab import ObjectsTab
@@ -18,10 +19,6 @@ if TYPE_CHECKING:
 
 DOTS = {"live": "●", "hold": "◐", "rest": "○"}
 NOTE_S = 6.0
-COUNTDOWN_S = 3
-"""From the click to the request, which looks back 2 s: the hand that clicked must lie still by then."""
-SHEET = """Lay both hands flat on the calibration sheet (`docs/calibration.md`), wrists on its marks, click, and keep
-still until the countdown ends. Then, for the size of the hands, touch its centre line with the fingertips."""
 
 
 class Panel:
@@ -31,6 +28,7 @@ class Panel:
         self._page, self._client = page, client
         self.objects: ObjectsTab | None = None
         self._takes: TakesTab | None = None
+        self._calibration: CalibrateTab | None = None
         self._paused = False
         gui = client.gui
         gui.main_panel.dock_right()
@@ -38,14 +36,14 @@ class Panel:
         if operator:
             self._controls(gui)
             tabs = gui.add_tab_group()
-            with tabs.add_tab("Scene", viser.Icon.STACK_2):
+            with tabs.add_tab("Scene"):
                 self._scene(gui)
-            with tabs.add_tab("Objects", viser.Icon.CUBE):
-                self.objects = ObjectsTab(page, gui, self.doing)
-            with tabs.add_tab("Takes", viser.Icon.MOVIE):
+            with tabs.add_tab("Objects"):
+                self.objects = ObjectsTab(page, client, self.doing)
+            with tabs.add_tab("Takes"):
                 self._takes = TakesTab(page, gui, self.doing)
-            with tabs.add_tab("Calibrate", viser.Icon.RULER_MEASURE):
-                self._calibration(gui)
+            with tabs.add_tab("Calibrate"):
+                self._calibration = CalibrateTab(page, gui, self.doing)
         side = gui.add_panel()
         with side.add_tab("Health", viser.Icon.HEARTBEAT):
             self._health = gui.add_markdown("")
@@ -63,10 +61,17 @@ class Panel:
         self._headline.content = _headline(self._page, status, history)
         self._health.content = _health(status)
         self._plots.show(history)
-        if self.objects is not None and self._takes is not None:
-            self._show_paused(status)
-            self.objects.refresh()
+        if self.objects is not None and self._takes is not None and self._calibration is not None:
+            self._show_paused(_paused(status))
+            answer = self._page.link.ask(op="objects")
+            self.objects.refresh(answer)
+            self._calibration.refresh(answer["bodies"])
             self._takes.refresh()
+
+    def follow(self, frame: Frame | None) -> None:
+        """Let what hangs on a prop be where it is at a tick; None for a recording."""
+        if self.objects is not None:
+            self.objects.follow(frame)
 
     def doing(self, action: Callable[[], str | None]) -> None:
         """Do what the visitor asked for, and tell how it went where there is anything to tell."""
@@ -80,16 +85,11 @@ class Panel:
 
     def _controls(self, gui: viser.GuiApi) -> None:
         self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="hold the hands where they are")
-        rest = gui.add_button("Rest", icon=viser.Icon.HAND_STOP, hint="ease the hands to their rest pose")
+        rest = gui.add_button(
+            "Rest", icon=viser.Icon.HAND_STOP, hint="ease the hands to their rest pose, to begin anew"
+        )
         self._on_click(self._pause, self._toggle_pause)
         self._on_click(rest, self._ask(op="rest"))
-
-    def _calibration(self, gui: viser.GuiApi) -> None:
-        gui.add_markdown(SHEET)
-        wrists = gui.add_button("Hands are on the marks", icon=viser.Icon.HAND_STOP)
-        tips = gui.add_button("Fingertips touch the line", icon=viser.Icon.HAND_FINGER)
-        self._on_click(wrists, lambda: self._calibrate("wrists", wrists))
-        self._on_click(tips, lambda: self._calibrate("fingertips", tips))
 
     def _scene(self, gui: viser.GuiApi) -> None:
         slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
@@ -111,20 +111,7 @@ class Panel:
     def _toggle_pause(self) -> None:
         self._page.link.ask(op="pause", on=not self._paused)
 
-    def _calibrate(self, step: str, button: viser.GuiButtonHandle) -> str:
-        label, button.disabled = button.label, True
-        try:
-            for left in range(COUNTDOWN_S, 0, -1):
-                button.label = f"Keep still … {left}"
-                time.sleep(1.0)
-            answer = self._page.link.ask(op="calibrate", step=step)
-        finally:
-            button.label, button.disabled = label, False
-        kept = f"kept in {answer['stored']}" if answer.get("stored") else answer.get("note", "")
-        return f"quality {answer['quality']}, hands {answer['hand_scale']:.3f} times the model's; {kept}"
-
-    def _show_paused(self, status: dict[str, Any]) -> None:
-        paused = any(actor.get("paused") for actor in status["actors"].values())
+    def _show_paused(self, paused: bool) -> None:
         if paused != self._paused:
             self._paused = paused
             self._pause.label = "Go on" if paused else "Pause"
@@ -143,24 +130,36 @@ class Panel:
 def _headline(page: "Page", status: dict[str, Any], history: History) -> str:
     frames = page.live.values()
     if not frames:
-        return "○ **Waiting for bodies** — `manipnet doctor` says why nothing arrives"
+        return "○ **Waiting for bodies**: `manipnet doctor` says why nothing arrives"
     latency = next(iter(frames)).message.latency_ms
-    what = f"▶ **{page.recording.name}**" if page.recording is not None else "● **Live**"
-    waits = f"{latency.buffer:.0f} ms ahead + {latency.total - latency.buffer:.1f} ms"
-    return f"{what} · {history.rate_hz:.0f} hands/s · {waits}"
+    what = "◐ **Paused**" if _paused(status) else "● **Live**"
+    if page.recording is not None:
+        what = f"▶ **{page.recording.name}**"
+    waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms work"
+    return f"{what} · {history.rate_hz:.0f} hands/s\n\n{waits}"
+
+
+def _paused(status: dict[str, Any]) -> bool:
+    return any(actor.get("paused") for actor in status["actors"].values())
 
 
 def _health(status: dict[str, Any]) -> str:
-    rows = ["| | body | samples/s | last seen |", "|---|---|--:|--:|"]
+    rows = ["| | body | per s | seen |", "|---|---|--:|--:|"]
+    hands = []
     for name, actor in status["actors"].items():
         if len(status["actors"]) > 1:
             rows.append(f"| | **{name}** | | |")
         for body, health in actor["bodies"].items():
             age_s, rate_hz = health["age_s"], health["rate_hz"]
-            age = "never" if age_s is None or not math.isfinite(age_s) else f"{1e3 * age_s:.0f} ms"
+            age = "never" if age_s is None or not math.isfinite(age_s) else _ago(age_s)
             rows.append(f"| {DOTS[health['state']]} | {body} | {rate_hz or 0.0:.0f} | {age} |")
-        hands = ", ".join(f"{side} {hand['state']}" for side, hand in actor["hands"].items())
-        rows.append(f"| | {hands} | | |")
+        for side, hand in actor["hands"].items():
+            hands.append(f"{side} hand **{hand['state']}**" + (f" on {hand['object']}" if hand["object"] else ""))
     counters = status["counters"]
     lost = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
-    return "\n".join(rows) + f"\n\n{lost} frames and bodies refused since the start"
+    refused = f"{lost} frames and bodies refused" if lost else "nothing refused"
+    return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, f"{refused} since the start"])
+
+
+def _ago(age_s: float) -> str:
+    return f"{1e3 * age_s:.0f} ms" if age_s < 1.0 else f"{age_s:.0f} s ago"

@@ -6,6 +6,7 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from pathlib import Path
 
+from manipnet.actor import ON_THE_BODY
 from manipnet.objects.library import library_names, load_library_mesh
 from manipnet.objects.mesh import ClosedMesh, MeshError, load_mesh
 from manipnet.page.frames import Frame, PropView, ShapeView
@@ -43,7 +44,7 @@ def read_recording(path: Path) -> Recording:
     props, shapes = [], {}
     for name, (mesh, scale) in _meshes(read_about(path)).items():
         shapes[mesh.content_hash] = ShapeView(mesh.name, mesh.content_hash, mesh.vertices, mesh.faces)
-        props.append(PropView(name, mesh.name, mesh.content_hash, scale))
+        props.append(PropView(name, mesh.name, mesh.content_hash, scale, ON_THE_BODY))
     return Recording(path.name, messages, tuple(props), shapes)
 
 

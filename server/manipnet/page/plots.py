@@ -58,7 +58,7 @@ class Plots:
     """The charts in one visitor's panel."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        self._rate = _chart(gui, "Hands per second", (("hands/s", "#58a6ff"),), (0.0, 75.0))
+        self._rate = _chart(gui, "Hands per second, last 30 s", (("hands/s", "#58a6ff"),), (0.0, 80.0))
         self._delay = _chart(gui, "Work per tick, ms", (("packet to hands", "#f2a65a"),))
         colors = (("sense", "#7ee787"), ("network", "#d2a8ff"), ("IK", "#ff7b72"))
         self._stages = _chart(gui, "Stages, ms", colors)
@@ -81,6 +81,6 @@ def _chart(
         title=title,
         scales={"x": {"time": False, "range": (-SPAN_S, 0.0)}, "y": {"range": span} if span else {"auto": True}},  # pyright: ignore
         axes=({**axis, "size": 26}, {**axis, "size": 38}),  # pyright: ignore
-        legend={"show": len(series) > 1},
-        height=120 if len(series) == 1 else 150,
+        legend={"show": len(series) > 1, "live": False},
+        height=120 if len(series) == 1 else 165,
     )

@@ -116,6 +116,8 @@ class Page:
             if name not in self._views:
                 self._views[name] = ActorView(self._server.scene, name)
             self._views[name].show(frame, shapes, self.layers)
+            for panel in list(self._panels.values()):
+                panel.follow(None if self.recording is not None else frame)
 
     def play(self, recording: Recording | None) -> None:
         """Show a recording instead of what is live, or what is live again."""
