@@ -18,6 +18,7 @@ from manipnet.objects.bvh import Bvh, build_bvh
 from manipnet.objects.field import EXACT_WITHIN_CELLS, RESOLUTION, Field, build_field, signed_distance
 from manipnet.objects.mesh import ClosedMesh, load_mesh
 from manipnet.objects.rays import RayScene, ray_scene
+from manipnet.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES, simplified
 
 _CACHE_VERSION = f"1-{RESOLUTION}"
 PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
@@ -41,6 +42,7 @@ class Shape:
 
     mesh: ClosedMesh
     bvh: Bvh
+    """Of the mesh, or of a simpler one nearly the same (`simplify`)."""
     field: Field
     center_of_mass: Array
     """`(3,)`, for uniform density."""
@@ -118,7 +120,8 @@ def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     path = folder / cache_name(mesh)
     parts = _read_cache(path) or _read_cache(PREBUILT_FOLDER / path.name)
     if parts is None:
-        bvh = build_bvh(mesh.vertices, mesh.faces)
+        sensed = simplified(mesh)
+        bvh = build_bvh(sensed.vertices, sensed.faces)
         parts = bvh, build_field(bvh)
         _write_cache(path, *parts)
     mass = mass_properties(mesh.vertices[mesh.faces])
@@ -128,7 +131,8 @@ def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
 
 def cache_name(mesh: ClosedMesh) -> str:
     """File name of a mesh's shape in any cache folder."""
-    return f"{mesh.content_hash[:32]}-{_CACHE_VERSION}.npz"
+    fewer = f"-{FEWER_TRIANGLES}" if len(mesh.faces) > MOST_TRIANGLES else ""
+    return f"{mesh.content_hash[:32]}-{_CACHE_VERSION}{fewer}.npz"
 
 
 def _read_cache(path: Path) -> tuple[Bvh, Field] | None:
