@@ -33,7 +33,7 @@ def ball(tmp_path_factory):
 
 def solve(name, ball, angles, targets, center=FAR):
     """Solve with the ball at `center` of the wrist frame."""
-    solved, limits = np.empty(20), DOF_LIMITS_RAD
+    solved, limits = angles.copy(), DOF_LIMITS_RAD
     if name == "ccd":
         call(solve_ccd, angles, targets, limits, solved)
     else:
@@ -168,6 +168,20 @@ def test_a_hand_that_holds_closes_on_the_object(ball):
         gaps.append(fingertip_gaps(forward_kinematics(angles)[0], center).min())
     assert gaps[0] > 0.008
     assert -0.008 < gaps[1] < 0.002
+
+
+def test_a_finger_that_went_through_comes_out_on_the_side_it_came_from(ball):
+    """From beyond the middle of the ball the nearest way out is the far side, through which no finger gets."""
+    predicted = np.zeros(20)
+    predicted[9:12] = 0.5
+    targets, _ = forward_kinematics(predicted)
+    center = targets[19] + np.array([0.004, 0.0, 0.006])
+    assert fingertip_gaps(targets, center).min() < -0.03
+    solved = solve("least_squares", ball, predicted, targets, center)
+    positions, _ = forward_kinematics(solved)
+    assert fingertip_gaps(positions, center).min() > -0.01
+    assert np.all(solved[9:12] < 0.45)
+    np.testing.assert_allclose(solved[4:8], predicted[4:8], atol=0.05, err_msg="its neighbour stays")
 
 
 def fingertip_gaps(positions, center):

@@ -36,7 +36,7 @@ class TrainConfig:
     """What is trained and how. Defaults are those of the shipped bundles."""
 
     width: int = 384
-    architecture: Architecture = "manipnet"
+    architecture: Architecture = "resnet"
     carries_pose: bool = False
     """Predict the change of the pose, in units of its own deviation, instead of the pose."""
     hidden: tuple[str, ...] = ()
@@ -54,7 +54,7 @@ class TrainConfig:
     """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
     kept: float = 0.0
     """Share of a pose error that may remain after one tick."""
-    response: float = 0.4
+    response: float = 0.5
     """Share of the way to the answer that a hand goes in one tick; the answer leads by what that lags."""
     blended: float = 0.6
     """Samples at blended poses, per captured frame and round."""

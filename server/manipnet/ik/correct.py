@@ -29,12 +29,14 @@ def correct_by_least_squares(
     `distances (22,)` they were predicted with call for.
 
     `wrist` and `obj` are windows `(21, 7)` of the scene the network sees; `correction (20,)` is carried from
-    tick to tick.
+    tick to tick, and the solver starts from it.
     """
     rotation, translation, targets = matrix(), vector(), _targets()
     object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
     place_targets(solid, rotation, translation, scale, positions, distances, targets)
     hold = hold_share(wrist, obj)
+    for dof in range(len(angles)):
+        angles[dof] = clamp(predicted[dof] + correction[dof], limits, dof)
     solve_least_squares(predicted, targets, distances, hold, limits, solid.field, rotation, translation, scale, angles)
     _fade(angles, predicted, correction, limits)
 

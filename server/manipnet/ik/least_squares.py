@@ -20,6 +20,7 @@ from manipnet.ik.chains import (
     dof_moves,
 )
 from manipnet.ik.grip import grip_into
+from manipnet.ik.opening import open_stuck_fingers
 from manipnet.kernels import inner, on_stack
 from manipnet.objects.field import field_distance
 from manipnet.sensing.scene import map_direction_back, map_point
@@ -129,14 +130,14 @@ def _solve_in_place(normal, slope):
 
 
 @inner
-def solve_least_squares(start, targets, distances, hold, limits, field, rotation, translation, scale, angles):
-    """From the angles `start (20,)` to `angles (20,)` toward joint `targets (22, 3)`, inside `limits (20, 2)`, out of
-    the object, and onto it where predicted `distances (22,)` or the share `hold` of a grip say so."""
-    for dof in range(DOF_COUNT):
-        angles[dof] = start[dof]
+def solve_least_squares(predicted, targets, distances, hold, limits, field, rotation, translation, scale, angles):
+    """From a first guess in `angles (20,)` to better ones there: near the angles `predicted (20,)`, toward joint
+    `targets (22, 3)`, inside `limits (20, 2)`, out of the object, and onto it where predicted `distances (22,)` or the
+    share `hold` of a grip say so."""
     positions, rotations, axes = _positions(), _rotations(), _axes()
     normal, slope, grip = _square(), _numbers(), _grip()
     grip_into(distances, hold, grip)
+    open_stuck_fingers(angles, limits, field, rotation, translation, scale, positions, rotations, axes)
     for _ in range(ITERATIONS):
         forward_kinematics_into(angles, positions, rotations, axes)
         for finger in range(FINGERS):
@@ -144,7 +145,7 @@ def solve_least_squares(start, targets, distances, hold, limits, field, rotation
             for k in range(DOFS):
                 dof = DOFS * finger + k
                 normal[k, k] = STAY_WEIGHT_M2 + 1e-9
-                slope[k] = STAY_WEIGHT_M2 * (start[dof] - angles[dof])
+                slope[k] = STAY_WEIGHT_M2 * (predicted[dof] - angles[dof])
             _add_targets(finger, positions, axes, targets, normal, slope)
             _add_surface(
                 finger, positions, axes, distances, grip[finger], field, rotation, translation, scale, normal, slope
