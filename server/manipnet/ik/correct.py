@@ -10,7 +10,7 @@ from manipnet.network.layout import PRESENT
 from manipnet.sensing.scene import object_from_wrist
 
 _targets = on_stack(22, 3)
-FADE_SHARE = 0.5
+FADE_SHARE = 0.6
 """How much of the way to a new correction one tick goes: no popping."""
 
 
