@@ -30,7 +30,12 @@ def message() -> HandsMessage:
 def test_a_frame_arrives_as_it_was() -> None:
     rng = np.random.default_rng(1)
     view = HandView("Mug", *(rng.normal(size=shape) for shape in ((22, 3), (17, 3, 3), (22,), (22, 3))))
-    sent = Frame(message(), (PropView("Mug", "mug", "abc", 1.25, rng.normal(size=7)),), {"Mug": rng.normal(size=(21, 7))}, {"right": view})
+    sent = Frame(
+        message(),
+        (PropView("Mug", "mug", "abc", 1.25, rng.normal(size=7)),),
+        {"Mug": rng.normal(size=(21, 7))},
+        {"right": view},
+    )
     what, got = unpack(pack("frame", sent))
     assert what == "frame"
     assert (got.props[0].name, got.props[0].object, got.props[0].scale) == ("Mug", "mug", 1.25)

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -86,17 +86,27 @@ def load_rig(path: Path | None, settings: Sequence[str] = ()) -> Rig:
     return parse_rig(text, path.parent, str(path), settings)
 
 
-def parse_rig(text: str | None, folder: Path, where: str, settings: Sequence[str] = ()) -> Rig:
-    """A rig from the text of its file, `where` names it in errors; relative paths start at `folder`."""
+def parse_rig(
+    text: str | None,
+    folder: Path,
+    where: str,
+    settings: Sequence[str] = (),
+    find_mesh: Callable[[str], Path | None] | None = None,
+) -> Rig:
+    """A rig from the text of its file, `where` names it in errors; relative paths start at `folder`. A mesh is found
+    there or in the library, unless `find_mesh` says where it is."""
     tree, places = read_tree(_NOBODY_ELSE if text is None else text, where, settings)
-    return _Reader(folder, where, places).rig(tree)
+    return _Reader(folder, where, places, find_mesh).rig(tree)
 
 
 class _Reader:
     """Walks the parsed file; knows in which `places` its keys stand, for the errors."""
 
-    def __init__(self, folder: Path, where: str, places: Mapping[tuple, str]) -> None:
+    def __init__(
+        self, folder: Path, where: str, places: Mapping[tuple, str], find_mesh: Callable[[str], Path | None] | None
+    ) -> None:
         self._folder, self._where, self._places = folder, where, places
+        self._find_mesh = find_mesh or self._mesh
 
     def rig(self, top: dict[str, Any]) -> Rig:
         several = "actors" in top
@@ -147,11 +157,10 @@ class _Reader:
         self._known(table, at, ("body", "mesh", "unit", "scale", "name", "position", "rotation"))
         body = BodyConfig(self._key(table.get("body"), (*at, "body")), self._offset(table, at))
         text = self._typed(table.get("mesh"), (str,), (*at, "mesh"))
-        beside = self._folder / text
-        mesh = beside if os.path.isfile(beside) else library_file(text)  # Path.is_file raises for what is no path
+        mesh = self._find_mesh(text)
         if mesh is None:
             library = ", ".join(library_names())
-            there = beside if len(text) <= 256 else "of so long a name"
+            there = self._folder / text if len(text) <= 256 else "of so long a name"
             return self._fail(
                 (*at, "mesh"), f"is {_show(text)}; there is no file {there}, and the library has {library}"
             )
@@ -161,6 +170,10 @@ class _Reader:
         scale = self._number(table.get("scale", 1.0), (*at, "scale"))
         name = self._typed(table.get("name", str(body.key)), (str,), (*at, "name"))
         return ObjectConfig(name, body, mesh, unit, scale)
+
+    def _mesh(self, text: str) -> Path | None:
+        beside = self._folder / text
+        return beside if os.path.isfile(beside) else library_file(text)  # Path.is_file raises for what is no path
 
     def _body(self, value: Any, at: tuple) -> BodyConfig:
         if not isinstance(value, dict):

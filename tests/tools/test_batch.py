@@ -105,7 +105,7 @@ def test_a_failed_take_does_not_stop_the_others(
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 def test_a_process_that_dies_costs_one_take(takes: Path, tmp_path: Path, tiny_bundle: Path) -> None:
     jobs = [
-        Job(name, takes / file, {"Box": CUBE}, tiny_bundle, 0.5, tmp_path / f"{name}.npz")
+        Job(name, takes / file, {"Box": CUBE}, tiny_bundle, 0.5, None, tmp_path / f"{name}.npz")
         for name, file in (("first", "a.mcap"), ("second", "day2/b.mcap"))
     ]
     killed: list[str] = []

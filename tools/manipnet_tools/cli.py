@@ -54,6 +54,7 @@ VERBS = {
         (
             "takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz",
             "take.mcap --mesh Box=hammer.obj --out hammer.npz       the same take with another object",
+            "motive.csv --rig stage.toml --out fingers.npz          Motive's export, with the calibration of its rig",
         ),
     ),
     "batch": Verb(

@@ -1,12 +1,26 @@
-"""Meshes of a take's objects: those named on the command line, and those a recording keeps."""
+"""Meshes of a take's objects: those named on the command line or in a rig, and those a recording keeps."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from manipnet.objects.mesh import ClosedMesh, MeshError, load_mesh
 from manipnet.recording import read_about
 from manipnet_tools.takes import TakeError
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """A mesh file, and how it is read."""
+
+    path: Path
+    unit: str = "m"
+    scale: float = 1.0
+
+    def load(self) -> ClosedMesh:
+        """The mesh in metres. Raises `MeshError`."""
+        return load_mesh(self.path, self.unit, self.scale)
 
 
 def named_files(texts: Sequence[str], names: Iterable[str]) -> dict[str, Path]:

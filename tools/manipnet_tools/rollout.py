@@ -130,15 +130,20 @@ def _too_little(take: Take, ticks: Sequence[Tick]) -> str:
     return f"{take.name}: is {length_s:.2f} s long; fingers need half a second before and after, so more than 1 s"
 
 
-def hand_inputs(ticks: Ticks, shapes: dict[str, Shape]) -> dict[Side, HandInput]:
-    """Inputs of both hands, each dealing with one of the bodies in `shapes` at a time."""
+def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0) -> dict[Side, HandInput]:
+    """Inputs of both hands, each dealing with one of the bodies in `shapes` at a time.
+
+    For hands of another size than the model's the scene is as the model's hand would see it: smaller for a larger one.
+    """
+    shrink = np.append(np.full(3, 1.0 / hand_scale), np.ones(4))
     windows = np.stack([ticks.bodies[name].windows for name in shapes])
     inputs = {}
     for side in SIDES:
         wrist, other = (ticks.bodies[f"{name}_wrist"].windows for name in (side, OTHER[side]))
         held = _held(ticks, side, shapes)
         object_windows = windows[held, np.arange(len(held))]
-        inputs[side] = HandInput(side, wrist, other, object_windows, tuple(shapes.values()), held)
+        seen = (shrink * window for window in (wrist, other, object_windows))
+        inputs[side] = HandInput(side, *seen, tuple(shapes.values()), held, 1.0 / hand_scale)
     return inputs
 
 

@@ -92,11 +92,11 @@ def _read_trajectory(path: Path) -> Take:
 def _read_motive_csv(path: Path) -> Take:
     """Names such as LeftWrist or "left hand" become the conventional ones; the others stay."""
     motive = read_motive_csv(path)
-    bodies = {_conventional(name): BodyTrack(*track) for name, track in motive.bodies.items()}
+    bodies = {conventional(name): BodyTrack(*track) for name, track in motive.bodies.items()}
     return Take(path.stem, motive.rate_hz, motive.time_s, bodies)
 
 
-def _conventional(name: str) -> str:
+def conventional(name: str) -> str:
     letters = "".join(filter(str.isalpha, name.lower()))
     sides = [side for side in SIDES if letters in (f"{side}wrist", f"{side}hand")]
     return f"{sides[0]}_wrist" if sides else name

@@ -8,7 +8,7 @@ import hashlib
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from typing import Any, Final
@@ -18,6 +18,7 @@ from ray.exceptions import RayError
 
 from manipnet_tools.batch.job import Job, Outcome, do, failure, finished, keep, prepare, take_files
 from manipnet_tools.batch.local import Progress
+from manipnet_tools.rigged import RigText
 
 OWN: Final = "local"
 """In the place of an address: a cluster of our own on this machine, for as long as the batch takes."""
@@ -69,6 +70,7 @@ def run_there(jobs: Sequence[Job], processors: int, progress: Progress) -> Itera
         return
     model = ray.put(_read(sorted(file for file in jobs[0].model.iterdir() if file.is_file())))
     meshes = {name: ray.put((file.name, file.read_bytes())) for name, file in jobs[0].meshes.items()}
+    rig = ray.put(_packed(jobs[0].rig))
     remote = ray.remote(num_cpus=1, max_retries=1)(_do_parcel)
     running: dict[Any, Job] = {}
     for job in jobs:
@@ -84,7 +86,7 @@ def run_there(jobs: Sequence[Job], processors: int, progress: Progress) -> Itera
             yield failure(job, error)
             continue
         own = {name: meshes[name] for name in prepared.meshes}
-        running[remote.remote(parcel, model, list(own), *own.values())] = job
+        running[remote.remote(parcel, model, rig, list(own), *own.values())] = job
         progress(job.name, 0, 0)
     while running:
         yield _next(running)
@@ -110,7 +112,11 @@ def _next(running: dict[Any, Job]) -> Outcome:
 
 
 def _do_parcel(
-    parcel: Parcel, model: Files, names: list[str], *meshes: tuple[str, bytes]
+    parcel: Parcel,
+    model: Files,
+    rig: tuple[RigText, Files] | None,
+    names: list[str],
+    *meshes: tuple[str, bytes],
 ) -> tuple[Outcome, bytes, bytes]:
     """On a machine of the cluster: the job on its own disk, and the files that came out."""
     with TemporaryDirectory(prefix="manipnet-") as folder:
@@ -122,7 +128,8 @@ def _do_parcel(
         for name, (file, content) in zip(names, meshes, strict=True):
             _write(place / f"mesh{len(files)}", {file: content})
             files[name] = place / f"mesh{len(files)}" / file
-        job = Job(parcel.name, take, files, _model_here(model), parcel.look_ahead_s, place / "result.npz")
+        rig_here = None if rig is None else _unpacked(*rig, place / "rig")
+        job = Job(parcel.name, take, files, _model_here(model), parcel.look_ahead_s, rig_here, place / "result.npz")
         outcome = do(job)
         if outcome.state == "failed":
             return outcome, b"", b""
@@ -141,6 +148,19 @@ def _model_here(files: Files) -> Path:
             except OSError:
                 assert folder.is_dir(), "another process was first"
     return folder
+
+
+def _packed(rig: RigText | None) -> tuple[RigText, Files] | None:
+    """A rig with its mesh files, in the order of its props."""
+    if rig is None:
+        return None
+    return rig, {f"{k}{mesh.path.suffix}": mesh.path.read_bytes() for k, mesh in enumerate(rig.meshes.values())}
+
+
+def _unpacked(rig: RigText, files: Files, folder: Path) -> RigText:
+    _write(folder, files)
+    here = (replace(mesh, path=folder / file) for mesh, file in zip(rig.meshes.values(), files, strict=True))
+    return replace(rig, meshes=dict(zip(rig.meshes, here, strict=True)))
 
 
 def _folder(take: Path) -> str | None:

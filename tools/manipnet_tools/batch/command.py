@@ -18,6 +18,7 @@ from manipnet.objects.mesh import load_mesh
 from manipnet.timeline import MAX_LOOK_AHEAD_S
 from manipnet_tools.batch.job import Job, Outcome, keep
 from manipnet_tools.batch.local import run_here
+from manipnet_tools.rigged import read_rig
 
 FILE_TAKES = (".csv", ".mcap", ".txt")
 SUMMARY = "summary.json"
@@ -46,6 +47,10 @@ class BatchOptions:
     """A shipped bundle's name or a bundle folder."""
     look_ahead: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
     """Seconds of the future the synthesis knows, 0 to 0.5; the rest it forecasts."""
+    rig: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """The rig of all takes: whose bodies are what, calibrated; recordings of a server know by themselves."""
+    actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Who of a rig with several actors; the first by default."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Takes at a time on this machine; by default one per processor."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
@@ -78,7 +83,8 @@ def run(options: BatchOptions) -> None:
 
 
 def plan(options: BatchOptions) -> list[Job]:
-    """A job per take. Raises `BatchError`, `BundleError` and `MeshError` for what no take could be done with."""
+    """A job per take. Raises `BatchError`, `BundleError`, `MeshError`, `ConfigError` and `TakeError` for what no take
+    could be done with."""
     if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
         raise BatchError(f"--look-ahead is {options.look_ahead} s; allowed are 0 to {MAX_LOOK_AHEAD_S}")
     if options.jobs is not None and options.jobs < 1:
@@ -93,10 +99,10 @@ def plan(options: BatchOptions) -> list[Job]:
             raise BatchError(f"--mesh {text}: must be NAME=FILE, NAME an object of one of the takes")
         load_mesh(file)
         meshes[name] = Path(file).absolute()
-    model = load_bundle(options.model).folder.absolute()
+    model, rig = load_bundle(options.model).folder.absolute(), read_rig(options.rig, options.actor)
     names = take_names(options.folder, takes)
     return [
-        Job(name, take.absolute(), meshes, model, options.look_ahead, options.out.absolute() / f"{name}.npz")
+        Job(name, take.absolute(), meshes, model, options.look_ahead, rig, options.out.absolute() / f"{name}.npz")
         for take, name in zip(takes, names, strict=True)
     ]
 

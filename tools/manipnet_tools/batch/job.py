@@ -12,9 +12,10 @@ from typing import Literal
 from manipnet import __version__
 from manipnet.network.bundle import Bundle, load_bundle
 from manipnet.synthesis import Synthesizer
+from manipnet_tools.rigged import RigText, Staged, read_staged
 from manipnet_tools.rollout import tick_take
 from manipnet_tools.synthesize import read_shapes, synthesise, write_arrays
-from manipnet_tools.takes import Take, TakeError, read_take
+from manipnet_tools.takes import TakeError
 
 Advance = Callable[[int, int], None]
 """Hears how many hand-ticks are done, of how many."""
@@ -32,6 +33,8 @@ class Job:
     model: Path
     """The bundle's folder."""
     look_ahead_s: float
+    rig: RigText | None
+    """What the take's bodies are, where it does not know by itself."""
     out: Path
     """The file to write, .npz; what it was made from is beside it, .json."""
 
@@ -59,7 +62,7 @@ class Prepared:
     """A job whose take has been read: its own meshes, and the hash of everything its result depends on."""
 
     job: Job
-    take: Take
+    staged: Staged
     meshes: dict[str, Path]
     key: str
 
@@ -80,16 +83,23 @@ def failure(job: Job, error: Exception, seconds: float = 0.0) -> Outcome:
 
 
 def prepare(job: Job) -> Prepared:
-    """Read the take, and hash what the result depends on. Raises `TakeError`, `BundleError` and `OSError`."""
-    take = read_take(job.take)
+    """Read the take, and hash what the result depends on.
+
+    Raises `TakeError`, `ConfigError`, `BundleError` and `OSError`.
+    """
+    staged = read_staged(job.take, job.rig)
+    take, rig_meshes = staged.take, {} if job.rig is None else job.rig.meshes
     meshes = {name: file for name, file in sorted(job.meshes.items()) if name in take.objects}
-    if not meshes and job.meshes and job.take.suffix.lower() != ".mcap":
+    if not meshes and job.meshes and job.take.suffix.lower() != ".mcap" and not rig_meshes:
         have, given = ", ".join(take.objects) or "none", ", ".join(job.meshes)
         raise TakeError(f"{job.take}: its objects are {have}; --mesh names none of them, only {given}")
     digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s}".encode())
-    for name, file in [*((file.name, file) for file in take_files(job.take)), *meshes.items()]:
+    if job.rig is not None:
+        digest.update(f"{job.rig.actor} {job.rig.text}".encode())
+    rigged = ((name, file.path) for name, file in sorted(rig_meshes.items()))
+    for name, file in [*((file.name, file) for file in take_files(job.take)), *meshes.items(), *rigged]:
         digest.update(f" {name} {file.stat().st_size} ".encode() + file.read_bytes())
-    return Prepared(job, take, meshes, digest.hexdigest())
+    return Prepared(job, staged, meshes, digest.hexdigest())
 
 
 def take_files(take: Path) -> list[Path]:
@@ -116,9 +126,9 @@ def keep(path: Path, content: bytes) -> None:
 
 
 def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
-    job = prepared.job
-    shapes = read_shapes([f"{name}={file}" for name, file in prepared.meshes.items()], prepared.take, job.take)
-    ticks = tick_take(prepared.take, job.look_ahead_s)
+    job, take = prepared.job, prepared.staged.take
+    shapes = read_shapes([f"{name}={file}" for name, file in prepared.meshes.items()], take, job.take, job.rig)
+    ticks = tick_take(take, job.look_ahead_s)
     total, done = 2 * len(ticks.time_s), 0
 
     def count(steps: int) -> None:
@@ -127,7 +137,7 @@ def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
         advance(done, total)
 
     advance(0, total)
-    hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count)
+    hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count, prepared.staged.hand_scale)
     part = job.out.with_name(f"{job.out.name}.part")
     with part.open("wb") as file:
         write_arrays(file, ticks, shapes, hands)
