@@ -23,13 +23,9 @@ class PropView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandView:
-    """What one hand was synthesised from and to, in its own wrist frame as a right hand of the model's size."""
+    """What the network said of one hand, in its own wrist frame as a right hand of the model's size."""
 
     prop: str
-    positions: Array
-    """`(22, 3)` before the tick: where the sensors sat."""
-    rotations: Array
-    """`(17, 3, 3)` before the tick."""
     distances: Array
     """`(22,)` joint to surface, as predicted."""
     raw_positions: Array

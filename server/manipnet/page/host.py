@@ -65,9 +65,7 @@ class LivePage:
         self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
     ) -> None:
         """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
-        props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
-        windows = {name: body.window for name, body in tick.bodies.items()}
-        frame = Frame(message, props, windows, {} if plan is None else _hands(actor, plan, steps))
+        frame = frame_of(actor, tick, steps, message)
         with self._news:
             if message.actor in self._newest:
                 self._counters.add("page_frames", fate="skipped")
@@ -172,17 +170,21 @@ class LivePage:
             ours.send_bytes(parcel)
 
 
+def frame_of(actor: Actor, tick: Tick, steps: Mapping[Side, HandStep], message: HandsMessage) -> Frame:
+    """All there is to see of one tick of an actor."""
+    props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
+    windows = {name: body.window for name, body in tick.bodies.items()}
+    about = {side: actor.hands[side].prop for side in steps}
+    hands = {
+        side: HandView(prop, steps[side].distances, steps[side].raw_positions)
+        for side, prop in about.items()
+        if prop is not None
+    }
+    return Frame(message, props, windows, hands)
+
+
 def _prop(prop: Prop, offset: Array) -> PropView:
     return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
-
-
-def _hands(actor: Actor, plan: Plan, steps: Mapping[Side, HandStep]) -> dict[Side, HandView]:
-    hands: dict[Side, HandView] = {}
-    for side, step in steps.items():
-        before, prop = plan.memories[side], actor.hands[side].prop
-        if prop is not None:
-            hands[side] = HandView(prop, before.positions, before.rotations, step.distances, step.raw_positions)
-    return hands
 
 
 def _page(listener: socket.socket, connection: Connection) -> None:

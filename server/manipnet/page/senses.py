@@ -1,4 +1,8 @@
-"""What a hand sensed and aimed for at a tick, computed anew for the eye: in the page's process, by the same kernels."""
+"""What a hand senses and aimed for at a tick, computed for the eye: in the page's process, by the network's kernels.
+
+The sensors are those of the hand as it is shown. The network's own were on the pose it went on from, a tick before and
+without its grip: they would be up to a centimetre beside the fingers.
+"""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array, mirror_points, mirror_poses, transform
+from manipnet.hand.kinematics import forward_kinematics
 from manipnet.ik.senses import present_senses
 from manipnet.objects.mesh import ClosedMesh
 from manipnet.objects.shape import Shape, build_shape
@@ -39,9 +44,10 @@ class Senser:
         self._shapes: dict[str, Shape] = {}
 
     def sense(self, frame: Frame, side: Side, view: ShapeView, prop_scale: float) -> Senses:
-        """What the hand of one side sensed of the shape it was about."""
-        hand, size = frame.hands[side], frame.message.hands[side].scale
-        wrist, obj = (_present(frame, name, size) for name in (f"{side}_wrist", hand.prop))
+        """What the hand of one side senses of the shape it is about."""
+        hand, shown = frame.hands[side], frame.message.hands[side]
+        size, positions, rotations = shown.scale, *forward_kinematics(np.asarray(shown.angles, np.float64))
+        wrist, obj = (_shrunk(pose, size) for pose in (shown.wrist, _present(frame, hand.prop)))
         mirrored = side == "left"
         if mirrored:
             wrist, obj = mirror_poses(wrist), mirror_poses(obj)
@@ -51,15 +57,15 @@ class Senser:
             obj,
             mirrored,
             prop_scale / size,
-            hand.positions,
-            hand.rotations,
+            positions,
+            rotations,
             hand.raw_positions,
             hand.distances,
         )
 
         def world(points: Array) -> Array:
             real = mirror_points(points) if mirrored else points
-            return transform(_present(frame, f"{side}_wrist", 1.0), size * real)
+            return transform(_shrunk(shown.wrist, 1.0), size * real)
 
         origin = world(np.zeros((1, 3)))
         return Senses(
@@ -79,8 +85,11 @@ class Senser:
         return self._shapes[view.content_hash]
 
 
-def _present(frame: Frame, name: str, size: float) -> Array:
-    """Where a body is at the tick, as a hand of the model's size would see it."""
-    pose = frame.windows[name][len(frame.windows[name]) // 2].copy()
-    pose[:3] /= size
-    return pose
+def _present(frame: Frame, name: str) -> Array:
+    """Where a body is at the tick."""
+    return frame.windows[name][len(frame.windows[name]) // 2]
+
+
+def _shrunk(pose: Array, size: float) -> Array:
+    """A pose as a hand of the model's size would see it."""
+    return np.concatenate([np.asarray(pose[:3], np.float64) / size, pose[3:]])
