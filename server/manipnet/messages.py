@@ -43,7 +43,7 @@ def hand_poses(hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, Hand
     if not hands:
         return {}
     shown = [hand.shown for hand in hands.values()]
-    angles, wrists = np.stack([hand.angles for hand in shown]), np.stack([hand.wrist for hand in shown])
+    angles, wrists = np.array([hand.angles for hand in shown]), np.array([hand.wrist for hand in shown])
     local, joints = pose_in_world(list(hands), angles, wrists, scale)
     return {
         side: HandPose(

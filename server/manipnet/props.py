@@ -45,19 +45,24 @@ def choose_prop(
     if len(tracked) < 2:
         return tracked[0] if tracked else None
     palm = _carried(T_world_wrist.tolist(), PALM_M[side])
-    nearest, least_m = tracked[0], math.inf
-    # no exact distance for a prop that is farther than the nearest one even if it reaches all the way to the palm
-    for bound_m, _, prop in sorted((_least_distance(palm, prop, bodies), i, prop) for i, prop in enumerate(tracked)):
-        advantage_m = HYSTERESIS_M if prop is held else 0.0
-        if bound_m - advantage_m < least_m:
-            distance_m = palm_distance(palm, prop, bodies[prop.name].pose) - advantage_m
-            if distance_m < least_m:
-                nearest, least_m = prop, distance_m
-    return nearest
+    ranges = [
+        _distance_range(palm, prop, bodies[prop.name].pose, HYSTERESIS_M if prop is held else 0.0) for prop in tracked
+    ]
+    within_m = min(most_m for _, most_m in ranges)
+    rivals = [prop for prop, (least_m, _) in zip(tracked, ranges, strict=True) if least_m <= within_m]
+    if len(rivals) == 1:  # far enough from all others: no need to look at surfaces
+        return rivals[0]
+    exact = [palm_distance(palm, p, bodies[p.name].pose) - (HYSTERESIS_M if p is held else 0.0) for p in rivals]
+    return rivals[exact.index(min(exact))]
 
 
-def _least_distance(p_palm: Sequence[float], prop: Prop, bodies: Mapping[str, BodyAtTick]) -> float:
-    return math.dist(p_palm, bodies[prop.name].pose[:3].tolist()) - prop.shape.reach_m * prop.scale
+def _distance_range(
+    p_palm: Sequence[float], prop: Prop, T_world_object: Array, advantage_m: float
+) -> tuple[float, float]:
+    """Between what the distance of a world point to a prop's surface is, less an advantage: distances change no faster
+    than one moves, and the one at its origin is known."""
+    away_m = math.dist(p_palm, T_world_object[:3].tolist()) - advantage_m
+    return away_m - prop.shape.reach_m * prop.scale, away_m + prop.shape.distance_at_origin_m * prop.scale
 
 
 def palm_distance(p_palm: Sequence[float], prop: Prop, T_world_object: Array) -> float:

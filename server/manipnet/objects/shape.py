@@ -71,6 +71,11 @@ class Shape:
         return float(np.linalg.norm(np.abs(self.bounds).max(axis=0)))
 
     @cached_property
+    def distance_at_origin_m(self) -> float:
+        """Signed distance of the origin of its frame, metres at scale 1."""
+        return self.distance((0.0, 0.0, 0.0))
+
+    @cached_property
     def solid(self) -> Solid:
         """What kernels know of it."""
         return Solid(self.bvh, self.field, EXACT_WITHIN_CELLS * self.field.cell_m, self.center_of_mass)

@@ -1,4 +1,4 @@
-"""The models that are timed: the shipped small one, and the paper's width in single precision and in 8 bits."""
+"""The models that are timed: the shipped small one, and the paper's width in single precision and quantised."""
 
 from dataclasses import dataclass, replace
 
@@ -40,8 +40,8 @@ def quantised(full: FullWidth) -> Bundle:
     """The same with 8-bit weights. Raises `ModuleNotFoundError` without onnx."""
     from manipnet_tools.compress import quantise_weights
 
-    session = open_session("8 bits", quantise_weights(full.content))
-    return replace(full.bundle, name="full width, 8 bits", session=session)
+    session = open_session("quantised", quantise_weights(full.content))
+    return replace(full.bundle, name="full width, quantised", session=session)
 
 
 def apart_m(a: Bundle, b: Bundle, rows: np.ndarray) -> float:

@@ -27,8 +27,8 @@ TARGETS = (
     Target("tick, chosen model: p99", ("tick", "total", "p99"), 1.0),
     Target("tick at 5k triangles: p50", ("triangles", "5000", "total", "p50"), 0.5),
     Target("tick at 5k triangles: p99", ("triangles", "5000", "total", "p99"), 1.0),
-    Target("tick, full width in 8 bits: p50", ("models", "8 bits", "total", "p50"), 0.6),
-    Target("tick, full width in 8 bits: p99", ("models", "8 bits", "total", "p99"), 1.2),
+    Target("tick, full width quantised: p50", ("models", "quantised", "total", "p50"), 0.6),
+    Target("tick, full width quantised: p99", ("models", "quantised", "total", "p99"), 1.2),
     Target("sensors: p50", ("tick", "sense", "p50"), 0.2),
     Target("inverse kinematics: p50", ("tick", "ik", "p50"), 0.1),
     Target("200k triangles over 5k", ("ratios", "200k triangles"), 1.3),
@@ -123,8 +123,8 @@ def _totals(title: str, section: Figures) -> Iterator[str]:
                 f"{total['p50']:9.3f} {total['p99']:9.3f}   {stages}"
             )
     if "weights" in section:
-        apart_mm = section["8_bits_apart_mm"]
-        yield f"8 bits: {section['weights']} weights; random ones put joints at most {apart_mm:.2f} mm apart"
+        apart_mm = section["quantised_apart_mm"]
+        yield f"quantised: {section['weights']} weights; random ones put joints at most {apart_mm:.2f} mm apart"
 
 
 def _straightforward(section: Figures) -> Iterator[str]:

@@ -71,22 +71,22 @@ def tick(bench: Bench) -> Figures:
 
 
 def models(bench: Bench) -> Figures:
-    """The same tick with the paper's width, in single precision and in 8 bits, and with what else was asked for.
+    """The same tick with the paper's width, in single precision and quantised, and with what else was asked for.
 
-    8 bits are the shipped full-width bundle, or random weights where there is none.
+    Quantised is the shipped full-width bundle, or random weights where there is none.
     """
     try:
         random = quantised(bench.full)
     except ModuleNotFoundError as error:
         return {"skipped": f"{error.name} is not installed: it makes the 8-bit weights"}
     shipped = shipped_full_width()
-    bundles = {"single": bench.full.bundle, "8 bits": shipped or random} | {b.name: b for b in bench.beside}
+    bundles = {"single": bench.full.bundle, "quantised": shipped or random} | {b.name: b for b in bench.beside}
     rigs = {name: Rig(bundle, bench.performance) for name, bundle in bundles.items()}
     result = race(rigs, bench.reference, 0.15 * bench.seconds)
     rows = np.concatenate([_asked_features(rigs["single"]) for _ in range(30) if rigs["single"].tick()])
     return {name: _raced(result, name) for name in rigs} | {
         "weights": "random" if shipped is None else "shipped",
-        "8_bits_apart_mm": 1e3 * apart_m(bench.full.bundle, random, rows),
+        "quantised_apart_mm": 1e3 * apart_m(bench.full.bundle, random, rows),
     }
 
 
