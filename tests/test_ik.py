@@ -115,20 +115,29 @@ def carried(speed_m_s, turn_rad_s):
 
 
 BESIDE = np.array([0.1, 0.0, -0.05, 0.0, 0.6, 0.0, 0.8])
+CLOSE = np.tile(np.array([0.05, 1.0, 0.05]), (21, 1))
+"""Another wrist near all these objects."""
 STILL = np.tile(np.array([0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), (21, 1))
 
 
 @pytest.mark.parametrize(("speed", "turn"), [(0.2, 0.0), (0.0, 1.0), (0.1, -0.7)])
 def test_an_object_that_moves_with_the_wrist_is_held(speed, turn):
     wrist = carried(speed, turn)
-    assert call(hold_share, wrist, compose(wrist, np.tile(BESIDE, (21, 1)))) == pytest.approx(1.0)
+    assert call(hold_share, wrist, compose(wrist, np.tile(BESIDE, (21, 1))), CLOSE) == pytest.approx(1.0)
 
 
 def test_an_object_that_rests_or_moves_by_itself_is_not_held():
     wrist = carried(0.3, 0.5)
-    assert call(hold_share, wrist, STILL) == 0.0
-    assert call(hold_share, STILL, wrist) == 0.0
-    assert call(hold_share, STILL, compose(STILL, np.tile(BESIDE, (21, 1)))) == 0.0
+    assert call(hold_share, wrist, STILL, CLOSE) == 0.0
+    assert call(hold_share, STILL, wrist, CLOSE) == 0.0
+    assert call(hold_share, STILL, compose(STILL, np.tile(BESIDE, (21, 1))), CLOSE) == 0.0
+
+
+def test_what_moves_in_one_hand_while_the_other_is_far_is_held():
+    far = CLOSE + np.array([0.0, 0.3, 0.0])
+    moving = carried(0.3, 0.5)
+    assert call(hold_share, STILL, moving, far) == pytest.approx(1.0)
+    assert call(hold_share, STILL, STILL, far) == 0.0
 
 
 def test_a_grip_is_the_thumb_and_the_nearest_fingers():

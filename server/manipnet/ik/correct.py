@@ -23,18 +23,18 @@ def _fade(angles, predicted, correction, limits):
 
 @inner
 def correct_by_least_squares(
-    solid, wrist, obj, mirrored, scale, positions, distances, limits, predicted, angles, correction
+    solid, wrist, other, obj, mirrored, scale, positions, distances, limits, predicted, angles, correction
 ):
     """From `predicted (20,)` angles to `angles (20,)` nearer to the contacts that the joint `positions (22, 3)` and
     `distances (22,)` they were predicted with call for.
 
-    `wrist` and `obj` are windows `(21, 7)` of the scene the network sees; `correction (20,)` is carried from
-    tick to tick, and the solver starts from it.
+    `wrist`, `other (21, 3)` and `obj` are windows `(21, 7)` of the scene the network sees; `correction (20,)` is
+    carried from tick to tick, and the solver starts from it.
     """
     rotation, translation, targets = matrix(), vector(), _targets()
     object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
     place_targets(solid, rotation, translation, scale, positions, distances, targets)
-    hold = hold_share(wrist, obj)
+    hold = hold_share(wrist, obj, other)
     for dof in range(len(angles)):
         angles[dof] = clamp(predicted[dof] + correction[dof], limits, dof)
     solve_least_squares(predicted, targets, distances, hold, limits, solid.field, rotation, translation, scale, angles)

@@ -8,6 +8,7 @@ import numpy as np
 
 from manipnet.ik.chains import CAPSULE_ENDS, CAPSULE_RADII, CAPSULE_STARTS, CAPSULES, FINGERS
 from manipnet.kernels import inner, matrix, on_stack, vector
+from manipnet.network.layout import PRESENT
 from manipnet.sensing.scene import quat_to_matrix_into
 
 ARM_M = 0.05
@@ -18,6 +19,8 @@ STILL_M, MOVING_M = 0.004, 0.010
 """Motion of the object that does not count, and that counts in full."""
 TOGETHER, APART = 0.6, 1.0
 """Its motion as the wrist sees it, over its motion: surely held, surely not."""
+HELPS_M, ALONE_M = 0.15, 0.25
+"""How far the other wrist is from the object where it may hold it, and where it surely does not."""
 TAKES_PART_M = 0.010
 """A finger predicted to be this much farther from the object than the nearest one is left out of the grip."""
 _POINTS = 4
@@ -25,8 +28,11 @@ _points = on_stack(_POINTS, 3)
 
 
 @inner
-def hold_share(wrist, obj):
-    """How sure it is, 0 to 1, that the hand with poses `wrist (21, 7)` holds the object with poses `obj (21, 7)`."""
+def hold_share(wrist, obj, other):
+    """How sure it is, 0 to 1, that the hand with poses `wrist (21, 7)` holds the object with poses `obj (21, 7)`.
+
+    What moves without it is in the `other (21, 3)` wrist's hand, or, where that one is far, in its fingers.
+    """
     w, o, apart, first, first_seen = matrix(), matrix(), vector(), _points(), _points()
     moved = seen_moved = 0.0
     for t in range(FIRST, LAST):
@@ -51,7 +57,11 @@ def hold_share(wrist, obj):
         moved, seen_moved = max(moved, total), max(seen_moved, seen_total)
     moves = min(max((moved - STILL_M) / (MOVING_M - STILL_M), 0.0), 1.0)
     together = min(max((APART - seen_moved / max(moved, 1e-6)) / (APART - TOGETHER), 0.0), 1.0)
-    return moves * together
+    apart_m = 0.0
+    for i in range(3):
+        apart_m += (other[PRESENT, i] - obj[PRESENT, i]) ** 2
+    alone = min(max((np.sqrt(apart_m) - HELPS_M) / (ALONE_M - HELPS_M), 0.0), 1.0)
+    return moves * max(together, alone)
 
 
 @inner

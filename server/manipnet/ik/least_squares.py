@@ -39,7 +39,7 @@ PULL_REACH_M = 0.012
 """Capsules this near the surface that the network says are in contact are pulled onto it."""
 CONTACT_MARGIN_M = 0.006
 """A predicted distance of a capsule's radius means contact; this much more means none."""
-GRIP_SHARE = 0.7
+GRIP_SHARE = 0.4
 """Pull on the fingers of a hand that holds, over that on capsules the network says touch."""
 GRIP_REACH_M = 0.030
 """How far away the surface may be that they are pulled onto."""

@@ -88,6 +88,7 @@ def pose_by_least_squares(solid, windows, outputs, before, response, limits, fir
         correct_by_least_squares(
             solid,
             windows.wrist[n],
+            windows.other_wrist[n],
             windows.object[n],
             windows.mirrored[n],
             windows.scale[n],
