@@ -4,6 +4,7 @@ import json
 import math
 import queue
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -15,6 +16,7 @@ from typing import Any
 import msgpack
 import zmq
 
+from manipnet.config import is_loopback
 from manipnet.streams.curve import secure_client
 from manipnet.streams.keys import ClientKeys
 from manipnet.streams.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, decode_binary, decode_msgpack
@@ -154,6 +156,17 @@ class Subscriber:
                     message = socket.recv()
                     assert message.startswith(self._topic)
                     self._messages.put(self._decode(message[len(self._topic) :]))
+
+
+def own_address() -> str | None:
+    """An address of this machine that is not its loopback; None without one. Nothing is sent."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))
+        except OSError:
+            return None
+        address = probe.getsockname()[0]
+    return None if is_loopback(address) else address
 
 
 Poses = Callable[[float], dict[str | int, Sequence[float] | None]]

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from live_server import Stage, scene
+from live_server import Stage, own_address, scene, serving
 from manipnet.objects.library import LIBRARY_FOLDER
 
 
@@ -44,3 +44,20 @@ def test_a_mesh_is_brought_in_and_selected(stage: Stage, tmp_path: Path) -> None
 )
 def test_what_is_no_mesh_is_said(stage: Stage, more: dict, complaint: str) -> None:
     assert complaint in stage.server.ask({"op": "add_object"} | more)["error"]
+
+
+def test_another_machine_may_not_have_files_opened_here(tiny_bundle: Path, tmp_path: Path) -> None:
+    if (address := own_address()) is None:
+        pytest.skip("this machine has no address but its loopback")
+    path = tmp_path / "club.ply"
+    path.write_bytes((LIBRARY_FOLDER / "hammer.ply").read_bytes())
+    with serving("--model", str(tiny_bundle), "--host", "0.0.0.0", "--insecure") as server:
+        asked = {"op": "add_object", "file": str(path)}
+        port = server.addresses["control"].rpartition(":")[2]
+        server.addresses["control"] = f"tcp://{address}:{port}"
+        said = [server.ask(asked | {"file": file})["error"] for file in (str(path), "/nowhere.obj")]
+        assert said[0] == said[1], "it does not tell what is there"
+        assert "only clients there may ask; put the mesh into" in said[0]
+        assert "club" not in server.ask({"op": "objects"})["objects"]
+        server.addresses["control"] = f"tcp://127.0.0.1:{port}"
+        assert server.ask(asked) == {"object": "club"}

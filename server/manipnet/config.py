@@ -136,7 +136,8 @@ def parse_network(text: str) -> Network:
 def is_loopback(host: str) -> bool:
     """Whether only this machine can reach `host`."""
     try:
-        return ipaddress.ip_address(host).is_loopback
+        address = ipaddress.ip_address(host)
+        return (getattr(address, "ipv4_mapped", None) or address).is_loopback
     except ValueError:
         return host == "localhost"
 

@@ -11,6 +11,7 @@ from typing import Any, Final
 import msgpack
 import zmq
 
+from manipnet.config import is_loopback
 from manipnet.publisher import bind
 from manipnet.streams.gatekeeper import Gatekeeper
 from manipnet.streams.guard import Pace
@@ -22,6 +23,8 @@ MAX_REQUEST_BYTES: Final = 4096
 REQUESTS_PER_S: Final = 200
 BURST: Final = 50
 """Of all clients together; beyond it answers take longer, for most requests cost the hands some of their time."""
+LOCAL_OPS: Final = ("add_object",)
+ELSEWHERE: Final = "put the mesh into the server's folder --objects and select_object it, or drop it on the page there"
 _OPS: Final = tuple(op for op in CONTROL_OPS if op != "invalid")
 _log = logging.getLogger(__name__)
 
@@ -90,19 +93,24 @@ class Control:
                     frames = rep.recv_multipart(copy=False)
                     self._gatekeeper.connections.delivered(frames[0].get(zmq.SRCFD))
                     time.sleep(self._pace.delay_s(time.monotonic()))
-                    rep.send(self.answer([frame.bytes for frame in frames]))
+                    here = is_loopback(str(frames[0].get("Peer-Address")))
+                    rep.send(self.answer([frame.bytes for frame in frames], here))
                 except zmq.ContextTerminated:
                     return
                 except zmq.ZMQError as error:
                     _log.warning("control: an answer was lost: %s", error)
 
-    def answer(self, parts: list[bytes]) -> bytes:
-        """The answer to one request, whatever it is."""
+    def answer(self, parts: list[bytes], here: bool = True) -> bytes:
+        """The answer to one request, whatever it is; `here` if it comes from this machine."""
         as_json = bool(parts) and parts[0].lstrip()[:1] in (b"{", b"[")
         op = "invalid"
         try:
             request = _decode(parts)
             op = _operation(request)
+            if op in LOCAL_OPS and not here:
+                raise RequestError(
+                    f"{op} opens files of the server's machine, so only clients there may ask; {ELSEWHERE}"
+                )
             reply = self._handlers[op](request)
         except RequestError as error:
             reply = {"error": str(error)}

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import ipaddress
 import socket
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
@@ -17,6 +16,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
+from manipnet.config import is_loopback
 from manipnet.streams.websocket import LOCAL_PAGES
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
@@ -50,7 +50,7 @@ def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server
 def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
     """Viser has neither an option for a socket nor one for origins, so what it calls is stood in for."""
     original = websockets.asyncio.server.serve
-    exposed = not _is_loopback(listener.getsockname()[0])
+    exposed = not is_loopback(listener.getsockname()[0])
 
     def serve(handler: Any, _host: str, _port: int, *, process_request: Any, **options: Any) -> Any:
         async def handle(connection: ServerConnection) -> None:
@@ -91,7 +91,7 @@ def may_look(headers: Any, exposed: bool) -> bool:
 
 def may_act(address: str, headers: Any) -> bool:
     """Whether a visitor may change anything: one on this machine, through an address of this machine only."""
-    return _is_loopback(address) and may_look(headers, exposed=False)
+    return is_loopback(address) and may_look(headers, exposed=False)
 
 
 async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
@@ -103,11 +103,6 @@ async def _take_in(connection: ServerConnection, request: Request, dropped: Drop
     with contextlib.suppress(ConnectionClosed):
         content = await connection.recv(decode=False)
         await connection.send(await asyncio.to_thread(dropped, name, content))
-
-
-def _is_loopback(address: str) -> bool:
-    ip = ipaddress.ip_address(address)
-    return (getattr(ip, "ipv4_mapped", None) or ip).is_loopback
 
 
 def _with_script(response: Response | None) -> Response | None:
