@@ -5,7 +5,7 @@ import logging
 import secrets
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Protocol
 
 from platformdirs import user_log_path
@@ -177,7 +177,9 @@ class Server:
         props = cast.ask(lambda: [prop for actor in self._actors for prop in actor.props])
         bundle, rig = self._bundle, self._config.rig
         about = {"session": self.session, "version": __version__, "model": bundle.name, "model_hash": bundle.model_hash}
-        about |= {"objects": carried(props)} | ({"rig": rig.read_text(encoding="utf-8")} if rig else {})
+        about["objects"] = carried(props)
+        with suppress(OSError, UnicodeDecodeError):  # a rig file that has gone since is no reason to record nothing
+            about |= {"rig": rig.read_text(encoding="utf-8-sig")} if rig else {}
         return about, props
 
     def _zmq_bodies(self) -> ZmqBodies:

@@ -17,6 +17,32 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
+_CENTER = """find => (...asked) => {
+  const found = find(...asked);
+  if (!found) return null;
+  found.scrollIntoView({block: "nearest"});
+  const {x, y, width, height} = found.getBoundingClientRect();
+  return [x + width / 2, y + height / 2];
+}"""
+_VISIBLE = "[...document.querySelectorAll(kind)].filter(one => one.offsetParent)"
+_BY_TEXT = f"""text => {{
+  const says = one => [...one.childNodes].some(node => node.nodeType === 3 && node.textContent.trim() === text);
+  const kind = "body *";
+  return {_VISIBLE}.filter(says).at(-1);
+}}"""
+_BY_OPTION = f"""text => {{
+  const kind = "[role=option]";
+  return {_VISIBLE}.find(one => one.textContent.trim() === text);
+}}"""
+_BY_LABEL = f"""(text, number) => {{
+  const kind = "label";
+  let row = {_VISIBLE}.find(one => one.textContent.trim() === text);
+  const fields = () => [...row.querySelectorAll("input")].filter(one => one.type !== "hidden");
+  while (row && !fields().length) row = row.parentElement;
+  return row && fields()[number];
+}}"""
+"""Where on the page something is, in JavaScript: the middle of what a text, an option or a label leads to."""
+
 
 class Page:
     """One page of the browser."""
@@ -43,6 +69,33 @@ class Page:
             assert time.monotonic() < give_up, f"never true: {expression}"
             time.sleep(0.05)
         return value
+
+    def press(self, place: tuple[float, float], times: int = 1) -> None:
+        """Click with the mouse, as often as said in a row."""
+        at = {"x": place[0], "y": place[1], "button": "left"}
+        for count in range(1, times + 1):
+            for kind in ("mousePressed", "mouseReleased"):
+                self.call("Input.dispatchMouseEvent", type=kind, clickCount=count, **at)
+
+    def click(self, text: str, limit_s: float = 30.0) -> None:
+        """Click what says exactly this, once it is there."""
+        self.press(self.wait_for(f"({_CENTER})({_BY_TEXT})({json.dumps(text)}, 0)", limit_s))
+
+    def type(self, label: str, text: str, number: int = 0) -> None:
+        """Replace what is in one of the fields of a label, and press Enter."""
+        self.press(self.wait_for(f"({_CENTER})({_BY_LABEL})({json.dumps(label)}, {number})"), times=3)
+        self.call("Input.insertText", text=text)
+        for kind in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", windowsVirtualKeyCode=13)
+
+    def tick(self, label: str) -> None:
+        """Click the checkbox of a label."""
+        self.press(self.wait_for(f"({_CENTER})({_BY_LABEL})({json.dumps(label)}, 0)"))
+
+    def choose(self, label: str, option: str) -> None:
+        """Open the list of a label and take one of its options."""
+        self.tick(label)
+        self.press(self.wait_for(f"({_CENTER})({_BY_OPTION})({json.dumps(option)}, 0)"))
 
     def screenshot(self, path: Path) -> None:
         """What the page looks like, as PNG."""

@@ -52,12 +52,14 @@ class Panel:
 
     def refresh(self) -> None:
         """Bring it up to date, twice a second."""
-        history = next(iter(self._page.histories.values()), None) or History()
         try:
-            status = self._page.link.ask(op="status")
+            self._refresh()
         except RefusedError as error:
             self._headline.content = f"**the server does not answer:** {error}"
-            return
+
+    def _refresh(self) -> None:
+        history = next(iter(self._page.histories.values()), None) or History()
+        status = self._page.link.ask(op="status")
         self._headline.content = _headline(self._page, status, history)
         self._health.content = _health(status)
         self._plots.show(history)
