@@ -116,7 +116,9 @@ class Run:
             self._arrivals.append((t_s, now_s))
         doubled = 0
         for key, pose in poses.items():
-            track = self.tracks.setdefault(key, BodyTrack())
+            track = self.tracks.get(key)
+            if track is None:  # making one to throw it away would cost more than all the rest
+                track = self.tracks[key] = BodyTrack()
             track.seen_s = max(track.seen_s, t_s)
             doubled += pose is not None and not track.add(t_s, pose)
         return doubled
