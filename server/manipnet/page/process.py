@@ -27,6 +27,8 @@ from manipnet.page.web import OPERATOR, open_server
 from manipnet.streams.wire import Side
 
 REFRESH_S: Final = 0.5
+NICE: Final = 10
+"""Whatever is shown here can wait for the ticks, also on a machine that has no processor to spare."""
 FLOOR_EVERY: Final = 15
 """Frames between two looks at what is lowest."""
 
@@ -34,6 +36,8 @@ FLOOR_EVERY: Final = 15
 def serve(listener: socket.socket, connection: Connection) -> None:
     """Serve the page until the server ends, whatever way it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the server, which then ends this
+    if hasattr(os, "nice"):
+        os.nice(NICE)
     sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (viser greets there; it belongs to the server)
     link = Link(connection)
     logging.basicConfig(level=logging.WARNING, handlers=[LinkLog(link)], force=True)
