@@ -7,6 +7,7 @@ from manipnet.kernels import cached
 def test_what_is_compiled_aside_is_found_in_the_cache() -> None:
     first_start.compile_aside()
     assert cached(first_start.SENSING)
+    assert cached("_sample"), "what builds shapes"
     assert not cached("no_such_kernel")
 
 

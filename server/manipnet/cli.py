@@ -116,8 +116,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not helper.idle:
         logging.getLogger(__name__).warning("first start here: some 15 s go by while code is compiled, once")
     try:
-        server = Server(configure(arguments), terminal.say)
-        server.run(stop.is_set, helper.wait)
+        server = Server(configure(arguments), terminal.say, helper.wait)
+        server.run(stop.is_set)
     except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1

@@ -1,5 +1,5 @@
-"""The first start of an installation, when nothing is compiled yet: a second process compiles what hands sense with
-and some smaller kernels, while the first one imports, builds shapes and compiles inverse kinematics.
+"""The first start of an installation, when nothing is compiled yet: a second process compiles what hands sense with,
+what builds shapes and some smaller kernels, while the first one imports and compiles inverse kinematics.
 
 Run as a module it is that second process; what it compiled it leaves in the cache.
 """
@@ -14,7 +14,7 @@ SENSING = "_all_but_readings"
 
 
 def compile_aside() -> None:
-    """Compile all kernels of a tick but the solver's, by using each once as a tick does."""
+    """Compile all kernels of a start and of a tick but the solver's, by using each once as they do."""
     import numpy as np
 
     from manipnet.body_track import BodyTrack, sample
@@ -22,12 +22,14 @@ def compile_aside() -> None:
     from manipnet.hand.joint_sets import pose_in_world
     from manipnet.hand.limits import keep_angles
     from manipnet.network.features import features
+    from manipnet.objects.field import build_field
     from manipnet.objects.library import load_library_mesh
     from manipnet.objects.shape import build_shape
     from manipnet.synthesis import HandScene, windows_of
 
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     scene = HandScene("right", still, still, still, build_shape(load_library_mesh("cube")))
+    build_field(scene.shape.bvh)
     features(scene.shape, windows_of([scene]), np.zeros((1, 22, 3)), np.tile(np.eye(3), (1, 17, 1, 1)))
     track, angles = BodyTrack(), np.zeros(20)
     for t_s in (0.0, 0.1):

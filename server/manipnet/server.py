@@ -36,7 +36,7 @@ from manipnet.synthesis import Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
 from manipnet.tick_loop import TickLoop
 from manipnet.wardrobe import MeshWatch, Wardrobe
-from manipnet.warm_up import warm_up
+from manipnet.warm_up import pose_a_hand, warm_up
 
 if TYPE_CHECKING:
     from manipnet.demo.performance import Demo
@@ -63,9 +63,14 @@ class Receiver(Protocol):
 class Server:
     """One server. `say` shows a line to a person and must return at once."""
 
-    def __init__(self, config: ServerConfig, say: Callable[[str], None]) -> None:
+    def __init__(
+        self, config: ServerConfig, say: Callable[[str], None], compiled_aside: Callable[[], object] = lambda: None
+    ) -> None:
         """Load what is configured; listen to nothing yet. Raises `ConfigError`, `KeyFileError`,
-        `BundleError` and `MeshError`."""
+        `BundleError` and `MeshError`.
+
+        `compiled_aside` returns once another process has compiled what this one does not.
+        """
         check(config)
         self._config, self._say = config, say
         self.session = secrets.token_hex(8)
@@ -75,18 +80,19 @@ class Server:
         self._around = Surroundings(self._mailbox.put)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model, config.provider)
+        pose_a_hand(self._bundle)
+        compiled_aside()
         self._actors = [self._actor(actor) for actor in config.actors]
         self._shown = 0
         self._demo = self._make_demo() if config.demo else None
 
-    def run(self, stopping: Callable[[], bool], compiled_aside: Callable[[], object] = lambda: None) -> None:
+    def run(self, stopping: Callable[[], bool]) -> None:
         """Listen, say `ready`, turn bodies into hands until `stopping`, close everything.
 
-        `compiled_aside` as for `warm_up`. Raises `ListenError` for an address that is taken, and `ConfigError` for a
-        receiver nobody knows.
+        Raises `ListenError` for an address that is taken, and `ConfigError` for a receiver nobody knows.
         """
         shapes = self._wardrobe.shapes() or [self._wardrobe.shape(WARM_UP_SHAPE)]
-        warm_up(self._bundle, shapes, compiled_aside)
+        warm_up(self._bundle, shapes)
         with ExitStack() as opened:
             loop, addresses = self._open(opened)
             sys.setswitchinterval(SWITCH_INTERVAL_S)

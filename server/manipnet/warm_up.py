@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,12 @@ from manipnet.ik.pose import pose_by_least_squares, room_for_poses
 from manipnet.mailbox import Mailbox
 from manipnet.network.bundle import Bundle
 from manipnet.network.layout import INPUT_SIZE
-from manipnet.objects.shape import Shape
+from manipnet.objects.library import load_library_mesh
+from manipnet.objects.shape import Shape, build_shape
 from manipnet.props import Prop
 from manipnet.streams.bodies import BodyFrame, BodySample
 from manipnet.streams.wire import encode_binary, encode_msgpack
-from manipnet.synthesis import HandScene, Synthesizer, state_of, windows_of
+from manipnet.synthesis import HandScene, Synthesizer, windows_of
 from manipnet.telemetry import Counters, StageClock, Timings
 from manipnet.tick_loop import TickLoop
 
@@ -30,13 +31,8 @@ LOOK_AHEAD_S = 0.4
 """So that there is something to forecast."""
 
 
-def warm_up(bundle: Bundle, shapes: Sequence[Shape], compiled_aside: Callable[[], object] = lambda: None) -> None:
-    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to.
-
-    `compiled_aside` returns once another process has compiled the other kernels of a tick.
-    """
-    _pose_a_hand(bundle, shapes[0])
-    compiled_aside()
+def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
+    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
     for shape in shapes:
         counters, timings = Counters(), Timings()
         mailbox = Mailbox(counters)
@@ -63,11 +59,12 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape], compiled_aside: Callable[[]
                 pass
 
 
-def _pose_a_hand(bundle: Bundle, shape: Shape) -> None:
-    """Decode and solve: the kernel that only this process compiles at a first start."""
-    rest, still = state_of(bundle.rest_angles), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
+def pose_a_hand(bundle: Bundle) -> None:
+    """Decode and solve: the kernel that this process compiles at a first start, while another compiles the rest."""
+    shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
-    outputs, before, poses = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), rest.angles[None], room_for_poses(1)
+    outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]
+    poses = room_for_poses(1)
     poses.correction[:] = 0.0
     pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
 
