@@ -16,7 +16,7 @@ LAYERS = (
     ("sensing", "network", "ik"),
     ("synthesis", "body_track", "forecast", "timeline", "streams", "recording"),
     ("presence", "output_guard", "config", "rig_source", "rig", "rig_file", "keys", "calibration"),
-    ("props", "wardrobe", "actor", "page"),
+    ("props", "workshop", "wardrobe", "actor", "page"),
     ("mailbox", "messages", "flight_recorder", "publisher", "control", "status", "metrics", "terminal", "diagnosis"),
     ("elsewhere", "self_report"),
     ("requests", "surroundings", "placing", "recorder", "tick_loop", "doctor"),

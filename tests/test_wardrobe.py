@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from manipnet import workshop
 from manipnet.actor import Actor
 from manipnet.config import BodyConfig, ObjectConfig, default_actor
 from manipnet.network.bundle import Bundle, load_bundle
@@ -17,6 +18,7 @@ from manipnet.props import HYSTERESIS_M, Prop
 from manipnet.streams.bodies import BodyFrame, BodySample
 from manipnet.telemetry import Counters
 from manipnet.wardrobe import MeshWatch, Wardrobe
+from manipnet.workshop import make_shape
 
 LIBRARY = {
     *("cube", "cylinder", "sphere", "torus", "prism", "tetrahedron", "hemisphere"),
@@ -130,6 +132,20 @@ def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     assert done.wait(60.0)
     watch.stop()
     assert len(tries) == 2
+
+
+def test_a_large_file_is_prepared_by_another_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = folder / "crate.ply"
+    box(path, 0.05)
+    here = make_shape(path, "m", 2.0)
+    monkeypatch.setattr(workshop, "LARGE_BYTES", 0)
+    there = make_shape(path, "m", 2.0)
+    assert (there.name, there.content_hash) == (here.name, here.content_hash)
+    np.testing.assert_array_equal(there.mesh.vertices, here.mesh.vertices)
+    np.testing.assert_array_equal(there.mesh.faces, here.mesh.faces)
+    path.write_bytes(b"ply, they said")
+    with pytest.raises(MeshError, match=r"crate\.ply: "):
+        make_shape(path, "m", 1.0)
 
 
 # --- what a hand makes of it

@@ -10,8 +10,9 @@ from typing import Final
 from manipnet.config import ObjectConfig
 from manipnet.objects.library import library_file, library_names
 from manipnet.objects.mesh import FORMATS, MeshError
-from manipnet.objects.shape import Shape, load_shape
+from manipnet.objects.shape import Shape
 from manipnet.props import Prop
+from manipnet.workshop import make_shape
 
 POLL_S: Final = 0.5
 MAX_FOLDER_FILES: Final = 1000
@@ -137,7 +138,7 @@ class Wardrobe:
 
     def _build(self, source: Source) -> Shape:
         self._stamps[source] = _stamp(source.path) or (0, 0)
-        shape = load_shape(source.path, source.unit, source.scale)
+        shape = make_shape(source.path, source.unit, source.scale)
         _ = shape.rays  # a tick must not be the first to ask for them
         with self._lock:
             self._shapes[source] = shape

@@ -80,7 +80,7 @@ def _chart(
         series=({"label": "s"}, *({"label": name, "stroke": color, "width": 2} for name, color in series)),  # pyright: ignore
         title=title,
         scales={"x": {"time": False, "range": (-SPAN_S, 0.0)}, "y": {"range": span} if span else {"auto": True}},  # pyright: ignore
-        axes=({**axis, "size": 26}, {**axis, "size": 38}),  # pyright: ignore
+        axes=({**axis, "size": 26}, {**axis, "size": 44}),  # pyright: ignore
         legend={"show": len(series) > 1, "live": False},
         height=120 if len(series) == 1 else 165,
     )
