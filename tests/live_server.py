@@ -189,9 +189,11 @@ class Stage:
             time.sleep(max(begin_s + i / rate_hz - time.monotonic(), 0.0))
             self.sender.send(self.start_s + i / rate_hz, poses(i / rate_hz))
         messages: list[HandsMessage] = []
-        while not messages or messages[-1].t_capture < self.start_s + seconds - 1e-6:
+        since_s = -1.0
+        while since_s < seconds - 1e-6:
             message = self.subscriber.next()
-            if -1e-6 <= message.t_capture - self.start_s <= seconds + 1e-6:
+            since_s = message.t_capture - self.start_s
+            if -1e-6 <= since_s <= seconds + 1e-6:
                 messages.append(message)
         return messages
 
