@@ -67,11 +67,12 @@ def quantise_weights(content: bytes) -> bytes:
     for node in model.graph.node:
         if node.op_type == "Gemm":
             weights = numpy_helper.to_array(stored.pop(node.input[1]))
-            bits = 4 if min(weights.shape) >= _WIDE else 8
+            outputs, inputs = weights.shape
+            bits = 4 if min(outputs, inputs) >= _WIDE else 8
             levels, scales = _in_stretches(weights, bits)
             names = [f"{node.input[1]}_levels", f"{node.input[1]}_scales"]
             stored |= {n: numpy_helper.from_array(v, n) for n, v in zip(names, (levels, scales), strict=True)}
-            node = _in_few_bits(node, *weights.shape, bits, names)
+            node = _in_few_bits(node, outputs, inputs, bits, names)
         nodes.append(node)
     del model.graph.node[:], model.graph.initializer[:]
     model.graph.node.extend(nodes)

@@ -25,7 +25,7 @@ def simplified(mesh: ClosedMesh) -> ClosedMesh:
     import fast_simplification
 
     # its thresholds are made for millimetres
-    vertices, faces = fast_simplification.simplify(1e3 * mesh.vertices, mesh.faces, target_count=FEWER_TRIANGLES)
+    vertices, faces, *_ = fast_simplification.simplify(1e3 * mesh.vertices, mesh.faces, target_count=FEWER_TRIANGLES)
     try:
         fewer = closed_mesh(1e-3 * np.asarray(vertices, np.float64), faces, mesh.name)
     except MeshError as error:
