@@ -190,7 +190,7 @@ class Stage:
             self.sender.send(self.start_s + i / rate_hz, poses(i / rate_hz))
         messages: list[HandsMessage] = []
         since_s = -1.0
-        while since_s < seconds - 1e-6:
+        while not messages or since_s < seconds - 1e-6:
             message = self.subscriber.next()
             since_s = message.t_capture - self.start_s
             if -1e-6 <= since_s <= seconds + 1e-6:

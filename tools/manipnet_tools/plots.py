@@ -69,7 +69,7 @@ def write_sweep(name: str, rows: "dict[str, Score]", folder: Path) -> Path:
     contacts.plot(list(rows), [score.contact_f1 for score in rows.values()], marker="o", color="tab:green")
     for axes, what in ((errors, "error, mm"), (contacts, "contact F1")):
         axes.set_ylabel(what)
-        axes.set_ylim(0.0, 1.15 * axes.dataLim.y1)
+        axes.set_ylim(bottom=0.0)
         axes.set_xlabel(name)
         axes.tick_params(axis="x", rotation=30)
         axes.grid(alpha=0.3)
