@@ -74,16 +74,20 @@ def test_layers_are_where_the_hand_of_their_tick_is(frames: list[Frame], prop: P
     for frame in frames:
         hand, senses = frame.message.hands[side], senser.sense(frame, side, view, PROP_SIZE)
         sensors = place_sensors(side, hand.angles, hand.wrist)
-        np.testing.assert_allclose(senses.points, sensors, atol=1e-6)
-        np.testing.assert_allclose(senses.raw[0], hand.wrist[:3], atol=1e-9)
+        points, targets = (transform(senses.wrist, local) for local in (senses.points, senses.targets))
+        np.testing.assert_allclose(points, sensors, atol=1e-6)
+        np.testing.assert_allclose(senses.wrist, hand.wrist)
+        np.testing.assert_allclose(senses.raw[0], 0.0, atol=1e-9)
         joints = world_bones(side, HAND_SIZE, hand.angles, hand.wrist)[0]
-        assert np.linalg.norm(senses.targets - joints, axis=1).max() < 0.25
-        middle = np.linalg.norm(senses.cells.mean(axis=0) - hand.wrist[:3])
-        assert middle == pytest.approx(HAND_SIZE * np.linalg.norm(CENTER_M), abs=1e-9)
+        assert np.linalg.norm(targets - joints, axis=1).max() < 0.25
+        assert np.linalg.norm(senses.cells.mean(axis=0)) == pytest.approx(
+            HAND_SIZE * np.linalg.norm(CENTER_M), abs=1e-9
+        )
         T_object_world = invert(next(body.pose for body in frame.message.bodies if body.name == "Box"))
         hits = np.abs(senses.readings) < 0.9 * HAND_SIZE * SENSOR_RANGE_M
         assert hits.any()
-        ends = transform(T_object_world, senses.points + senses.readings[:, None] * senses.normals)[hits]
+        ends = transform(senses.wrist, senses.points + senses.readings[:, None] * senses.normals)
+        ends = transform(T_object_world, ends)[hits]
         distance, *_ = prop.shape.signed_distance(ends / PROP_SIZE)
         assert np.abs(PROP_SIZE * distance).max() < 1e-3
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet.page.frames import Frame, PropView, ShapeView
-from manipnet.page.hands import HandModel
+from manipnet.page.hands import HandModel, wxyz
 from manipnet.page.props import PropModels
 from manipnet.page.senses import CELL_CENTERS, Senser, Senses
 from manipnet.sensing.ambient import CELL_M
@@ -39,9 +39,13 @@ PATH_COLOR: Final = (140, 190, 255)
 
 
 class HandLayers:
-    """The sensors, contacts and targets of one hand, under `name`."""
+    """The sensors, contacts and targets of one hand, under `name`.
+
+    They hang on its wrist: browsers move what hangs together at once, and take in new points when they find the time.
+    """
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._wrist = scene.add_frame(name, show_axes=False)
         self._ambient = _points(scene, f"{name}/ambient", len(CELL_CENTERS), 0.35 * CELL_M, AMBIENT_COLOR)
         self._rays = scene.add_line_segments(
             f"{name}/rays",
@@ -67,6 +71,7 @@ class HandLayers:
         self._raw.visible = self._targets.visible = self._aims.visible = "targets" in shown
         if senses is None:
             return
+        self._wrist.position, self._wrist.wxyz = senses.wrist[:3], wxyz(senses.wrist[3:])
         if "ambient" in shown:
             self._show_ambient(senses)
         if "proximity" in shown:

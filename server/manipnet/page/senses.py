@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from manipnet.geometry import Array, mirror_points, mirror_poses, transform
+from manipnet.geometry import Array, mirror_points, mirror_poses
 from manipnet.hand.kinematics import forward_kinematics
 from manipnet.ik.senses import present_senses
 from manipnet.objects.mesh import ClosedMesh
@@ -25,9 +25,11 @@ CELL_CENTERS: Final = CENTER_M + np.stack(np.meshgrid(_STEPS, _STEPS, _STEPS, in
 
 @dataclass(frozen=True, eq=False)
 class Senses:
-    """One hand's, in the world: occupancy `ambient (1000,)` of `cells (1000, 3)`; sensor `points`, `normals (104, 3)`
-    and `readings (104,)` in metres; joints before `raw (22, 3)` and `targets (22, 3)` of inverse kinematics."""
+    """One hand's, in the frame of its `wrist (7,)`: occupancy `ambient (1000,)` of `cells (1000, 3)`; sensor `points`,
+    `normals (104, 3)` and `readings (104,)` in metres; joints before `raw (22, 3)` and `targets (22, 3)` of inverse
+    kinematics."""
 
+    wrist: Array
     cells: Array
     ambient: np.ndarray
     points: Array
@@ -63,19 +65,18 @@ class Senser:
             hand.distances,
         )
 
-        def world(points: Array) -> Array:
-            real = mirror_points(points) if mirrored else points
-            return transform(_shrunk(shown.wrist, 1.0), size * real)
+        def real(points: Array) -> Array:
+            return size * (mirror_points(points) if mirrored else points)
 
-        origin = world(np.zeros((1, 3)))
         return Senses(
-            world(CELL_CENTERS),
+            _shrunk(shown.wrist, 1.0),
+            real(CELL_CENTERS),
             local.ambient,
-            world(local.points),
-            (world(local.normals) - origin) / size,
+            real(local.points),
+            real(local.normals) / size,
             local.readings * size,
-            world(hand.raw_positions),
-            world(local.targets),
+            real(hand.raw_positions),
+            real(local.targets),
         )
 
     def _shape(self, view: ShapeView) -> Shape:
