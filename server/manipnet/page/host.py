@@ -174,12 +174,10 @@ def frame_of(actor: Actor, tick: Tick, steps: Mapping[Side, HandStep], message: 
     """All there is to see of one tick of an actor."""
     props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
     windows = {name: body.window for name, body in tick.bodies.items()}
-    about = {side: actor.hands[side].prop for side in steps}
-    hands = {
-        side: HandView(prop, steps[side].distances, steps[side].raw_positions)
-        for side, prop in about.items()
-        if prop is not None
-    }
+    hands: dict[Side, HandView] = {}
+    for side, step in steps.items():
+        if (prop := actor.hands[side].prop) is not None:
+            hands[side] = HandView(prop, step.distances, step.raw_positions)
     return Frame(message, props, windows, hands)
 
 
