@@ -205,5 +205,6 @@ def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
-    for angles, positions, rotations, correction, distances, raw_positions, *felt in zip(*poses, strict=True):
-        yield HandStep(HandState(*felt, correction), angles, positions, rotations, distances, raw_positions)
+    for n, (angles, positions, rotations) in enumerate(zip(poses.angles, poses.positions, poses.rotations, strict=True)):
+        felt = HandState(poses.felt_angles[n], poses.felt_positions[n], poses.felt_rotations[n], poses.correction[n])
+        yield HandStep(felt, angles, positions, rotations, poses.distances[n], poses.raw_positions[n])

@@ -142,8 +142,9 @@ def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0)
         wrist, other = (ticks.bodies[f"{name}_wrist"].windows for name in (side, OTHER[side]))
         held = _held(ticks, side, shapes)
         object_windows = windows[held, np.arange(len(held))]
-        seen = (shrink * window for window in (wrist, other, object_windows))
-        inputs[side] = HandInput(side, *seen, tuple(shapes.values()), held, 1.0 / hand_scale)
+        inputs[side] = HandInput(
+            side, shrink * wrist, shrink * other, shrink * object_windows, tuple(shapes.values()), held, 1.0 / hand_scale
+        )
     return inputs
 
 
