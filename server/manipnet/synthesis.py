@@ -205,6 +205,5 @@ def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
-    for n, (angles, positions, rotations) in enumerate(zip(poses.angles, poses.positions, poses.rotations, strict=True)):
-        felt = HandState(poses.felt_angles[n], poses.felt_positions[n], poses.felt_rotations[n], poses.correction[n])
-        yield HandStep(felt, angles, positions, rotations, poses.distances[n], poses.raw_positions[n])
+    for angles, positions, rotations, correction, distances, raw, felt, at, turned in zip(*poses, strict=True):
+        yield HandStep(HandState(felt, at, turned, correction), angles, positions, rotations, distances, raw)

@@ -143,7 +143,13 @@ def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0)
         held = _held(ticks, side, shapes)
         object_windows = windows[held, np.arange(len(held))]
         inputs[side] = HandInput(
-            side, shrink * wrist, shrink * other, shrink * object_windows, tuple(shapes.values()), held, 1.0 / hand_scale
+            side,
+            shrink * wrist,
+            shrink * other,
+            shrink * object_windows,
+            tuple(shapes.values()),
+            held,
+            1.0 / hand_scale,
         )
     return inputs
 
