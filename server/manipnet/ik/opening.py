@@ -42,29 +42,26 @@ def open_stuck_fingers(angles, limits, field, rotation, translation, scale, posi
     `positions (22, 3)`, `rotations (17, 3, 3)` and `axes (20, 3)` are room to work in.
     """
     closed, least, best = _closed(), _depths(), _numbers()
-    forward_kinematics_into(angles, positions, rotations, axes)
-    stuck = False
-    least[0] = best[0] = 0.0
-    for finger in range(1, FINGERS):
-        least[finger] = _depth(finger, positions, field, rotation, translation, scale)
-        best[finger] = 0.0
-        stuck = stuck or least[finger] > STUCK_M
-    if not stuck:
-        return
     for dof in range(len(angles)):
         closed[dof] = angles[dof]
-    for step in range(1, OPENINGS + 1):
+    for step in range(OPENINGS + 1):
         share = step / OPENINGS
         for finger in range(1, FINGERS):
-            if least[finger] > STUCK_M:
+            if step > 0 and least[finger] > STUCK_M:
                 for k in range(DOFS):
                     dof = DOFS * finger + k
                     angles[dof] = clamp((1.0 - share) * closed[dof], limits, dof)
         forward_kinematics_into(angles, positions, rotations, axes)
+        stuck = False
         for finger in range(1, FINGERS):
-            if least[finger] > STUCK_M:
+            if step == 0 or least[finger] > STUCK_M:
                 depth = _depth(finger, positions, field, rotation, translation, scale)
-                if depth < least[finger]:
+                if step == 0 or depth < least[finger]:
                     least[finger], best[finger] = depth, share
-    for dof in range(len(angles)):
-        angles[dof] = clamp((1.0 - best[dof // DOFS]) * closed[dof], limits, dof)
+            stuck = stuck or least[finger] > STUCK_M
+        if not stuck:
+            break
+    for finger in range(1, FINGERS):
+        for k in range(DOFS):
+            dof = DOFS * finger + k
+            angles[dof] = clamp((1.0 - best[finger]) * closed[dof], limits, dof)
