@@ -1,8 +1,9 @@
 """How far off forecasts of wrists and props are: `python benchmarks/forecasts.py DATASET`.
 
-The fading velocity of `manipnet.forecast` beside a body that stands still and a linear predictor: at every horizon
-the displacement as a sum of the four last displacements (1, 2, 4, 8 sixtieths of a second ago), its weights fitted to
-the first four fifths of every take, with a tracker's noise, for wrists and props apart. Judged on the last fifth.
+The fading velocity of `manipnet.tracking.forecast` beside a body that stands still and a linear predictor: at every
+horizon the displacement as a sum of the four last displacements (1, 2, 4, 8 sixtieths of a second ago), its weights
+fitted to the first four fifths of every take, with a tracker's noise, for wrists and props apart. Judged on the last
+fifth.
 """
 
 import sys
@@ -10,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from manipnet.forecast import FADE_S, FADE_SPIN_S, damped_velocity
 from manipnet.geometry import Array, quat_conjugate, quat_exp, quat_log, quat_multiply
-from manipnet_tools.takes import read_take
+from manipnet.tracking.forecast import FADE_S, FADE_SPIN_S, damped_velocity
+from manipnet_tools.takes.take import read_take
 
 TICK_S = 1.0 / 60.0
 LAGS, AHEAD = np.array([1, 2, 4, 8]), np.array([3, 6, 9, 12, 18, 24, 30])

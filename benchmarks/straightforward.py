@@ -12,11 +12,20 @@ import torch
 import trimesh
 
 from manipnet.geometry import mirror_points, mirror_poses, quat_log, quat_multiply, quat_to_matrix
-from manipnet.hand.skeleton import PARENTS
-from manipnet.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
-from manipnet.network.layout import ENCODED, INPUT, INPUT_SIZE, OUTPUT, OUTPUT_SIZE, PRESENT, SENSED, WINDOW_STEP_S
-from manipnet.sensing.ambient import CELL_M, CELLS, CENTER_M
-from manipnet.synthesis import HandScene, HandState
+from manipnet.synthesis.hand.skeleton import PARENTS
+from manipnet.synthesis.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
+from manipnet.synthesis.model.layout import (
+    ENCODED,
+    INPUT,
+    INPUT_SIZE,
+    OUTPUT,
+    OUTPUT_SIZE,
+    PRESENT,
+    SENSED,
+    WINDOW_STEP_S,
+)
+from manipnet.synthesis.sensing.ambient import CELL_M, CELLS, CENTER_M
+from manipnet.synthesis.synthesizer import HandScene, HandState
 
 RANGE_M = 0.10
 NEAR_M = 0.028

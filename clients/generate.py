@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from manipnet.geometry import matrix_to_quat
-from manipnet.hand.joint_sets import OPENXR_JOINT_NAMES, OPENXR_PARENTS, webxr_name
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.hand.skeleton import DOF_COUNT, DOF_NAMES, JOINT_NAMES
-from manipnet.streams.bodies import MAX_BODIES
-from manipnet.streams.wire.schema import (
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS, webxr_name
+from manipnet.synthesis.hand.skeleton import DOF_COUNT, DOF_NAMES, JOINT_NAMES
+from manipnet.wire.bodies import MAX_BODIES
+from manipnet.wire.hands import (
     BODY,
     HAND,
     HEADER,

@@ -1,22 +1,24 @@
 """What every test may ask for."""
 
 import os
-import sys
+import queue
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from live_server import Stage, serving
-from manipnet.objects.library import LIBRARY_FOLDER
 from tiny_bundle import write_tiny_bundle
+
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+from manipnet.telemetry import Counters
+from manipnet.wire.bodies import BodyFrame
 
 # the first example pays for compiling; the same examples every run
 settings.register_profile("manipnet", deadline=None, derandomize=True)
 settings.load_profile("manipnet")
+
+PATIENCE_S = 20.0
 
 
 @pytest.fixture(scope="session")
@@ -47,3 +49,26 @@ def stage(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
         stage = Stage(server)
         yield stage
         stage.close()
+
+
+class Heard:
+    """A sink; `next()` waits for the next frame and fails the test when none comes."""
+
+    def __init__(self) -> None:
+        self.frames: queue.Queue[BodyFrame] = queue.Queue()
+
+    def __call__(self, frame: BodyFrame) -> None:
+        self.frames.put(frame)
+
+    def next(self) -> BodyFrame:
+        return self.frames.get(timeout=PATIENCE_S)
+
+
+@pytest.fixture
+def heard():
+    return Heard()
+
+
+@pytest.fixture
+def counters():
+    return Counters()

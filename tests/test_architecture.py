@@ -5,22 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from manipnet.kernels import COMPILED
+from manipnet.jit import COMPILED
 
 ROOT = Path(__file__).parents[1]
 SERVER, TOOLS = ROOT / "server" / "manipnet", ROOT / "tools" / "manipnet_tools"
 
 LAYERS = (
-    ("geometry", "kernels", "telemetry"),
-    ("hand", "objects"),
-    ("sensing", "network", "ik"),
-    ("synthesis", "body_track", "forecast", "timeline", "streams", "recording"),
-    ("presence", "output_guard", "config", "rig_source", "rig", "rig_file", "keys", "calibration"),
-    ("props", "workshop", "wardrobe", "actor", "page"),
-    ("mailbox", "messages", "flight_recorder", "publisher", "control", "status", "metrics", "terminal", "diagnosis"),
-    ("elsewhere", "self_report"),
-    ("requests", "surroundings", "placing", "recorder", "tick_loop", "doctor"),
-    ("warm_up", "first_start", "demo"),
+    ("wire", "telemetry", "geometry", "jit"),
+    ("net", "synthesis"),
+    ("inputs", "config", "tracking"),
+    ("outputs", "actors"),
+    ("runtime",),
+    ("control",),
+    ("recording",),
+    ("page", "demo"),
     ("server",),
     ("cli",),
 )
@@ -90,9 +88,9 @@ def test_the_live_path_stays_light(path: Path) -> None:
 @pytest.mark.parametrize("path", modules(SERVER), ids=lambda path: str(path.relative_to(SERVER)))
 def test_compiled_code_is_where_the_cache_looks_for_changes(path: Path) -> None:
     parts = {name.removesuffix(".py") for name in COMPILED}
-    if imported(path) & {"manipnet.kernels.kernel", "manipnet.kernels.inner"}:
+    if imported(path) & {"manipnet.jit.kernel", "manipnet.jit.inner"}:
         used = {name.split(".")[1] for name in imported(path) if name.startswith("manipnet.")}
-        assert used - {"kernels"} | {part(path)} <= parts
+        assert used - {"jit"} | {part(path)} <= parts
 
 
 @pytest.mark.parametrize("path", [*modules(SERVER), *modules(TOOLS)], ids=lambda path: path.name)

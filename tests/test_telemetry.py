@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from manipnet.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
-from manipnet.status import SilenceWatch
-from manipnet.streams.bodies import BodyFrame
+from manipnet.runtime.console import Terminal
+from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
+from manipnet.runtime.status import SilenceWatch
 from manipnet.telemetry import LABELS, Counters, RateLimit, Timings
-from manipnet.terminal import Terminal
-from manipnet.timeline import BodyHealth
+from manipnet.tracking.timeline import BodyHealth
+from manipnet.wire.bodies import BodyFrame
 
 SOURCES = sorted((Path(__file__).parents[1] / "server").rglob("*.py"))
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from manipnet import __version__
 
 if TYPE_CHECKING:
-    from manipnet.config import ServerConfig
+    from manipnet.config.settings import ServerConfig
 
 DEFAULTS = {
     "host": "127.0.0.1",
@@ -98,17 +98,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.print_config:
         return _print_config(arguments)
     # The libraries behind these take a second to load: --help and a mistyped option should not.
-    from manipnet.first_start import Helper
+    from manipnet.runtime.precompile import Helper
 
     helper = Helper()
     helper.start()
-    from manipnet.config import ConfigError
-    from manipnet.network.bundle import BundleError
-    from manipnet.objects.mesh import MeshError
+    from manipnet.config.settings import ConfigError
+    from manipnet.net.curve_keys import KeyFileError
+    from manipnet.net.errors import ListenError
+    from manipnet.runtime.console import Terminal
     from manipnet.server import Server
-    from manipnet.streams.intake import ListenError
-    from manipnet.streams.keys import KeyFileError
-    from manipnet.terminal import Terminal
+    from manipnet.synthesis.model.bundle import BundleError
+    from manipnet.synthesis.objects.mesh import MeshError
 
     stop = _stop_on_signals()
     terminal = Terminal(as_json=arguments.log_format == "json")
@@ -127,7 +127,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _print_config(arguments: argparse.Namespace) -> int:
-    from manipnet.config import ConfigError
+    from manipnet.config.settings import ConfigError
 
     try:
         print(describe(configure(arguments)), end="")
@@ -153,8 +153,8 @@ def _option(group: Any, name: str, kind: type, metavar: str, text: str) -> None:
 
 def describe(config: "ServerConfig") -> str:
     """A configuration as a rig file. Raises `ConfigError` for one that no server can be started from."""
-    from manipnet.config import check
-    from manipnet.rig_file import rig_text
+    from manipnet.config.rig_writer import rig_text
+    from manipnet.config.settings import check
 
     check(config)
     return rig_text(config)
@@ -162,15 +162,17 @@ def describe(config: "ServerConfig") -> str:
 
 def configure(arguments: argparse.Namespace) -> "ServerConfig":
     """Defaults, then the rig file's `[server]`, then the command line. Raises `ConfigError`."""
-    from manipnet.config import ConfigError, ServerConfig, parse_endpoint, parse_network, parse_object
-    from manipnet.rig import load_rig
-    from manipnet.streams import livelink_json, natnet, vmc
+    from manipnet.config.rig_reader import load_rig
+    from manipnet.config.settings import ConfigError, ServerConfig, parse_endpoint, parse_network, parse_object
+    from manipnet.inputs.natnet import protocol as natnet
+    from manipnet.outputs import livelink as livelink_json
+    from manipnet.outputs import vmc
 
     objects = tuple(parse_object(text) for text in arguments.mesh)
     if arguments.rig is not None and (objects or arguments.demo):
         raise ConfigError("--rig names the objects itself; leave out --mesh and --demo, or change a key with --set")
     if arguments.demo:
-        from manipnet.demo.performance import demo_objects
+        from manipnet.demo.player import demo_objects
 
         objects = demo_objects(objects)
     rig = load_rig(arguments.rig, arguments.set)

@@ -11,35 +11,38 @@ from typing import TYPE_CHECKING, Protocol
 from platformdirs import user_log_path
 
 from manipnet import __version__
-from manipnet.actor import Actor
-from manipnet.config import ActorConfig, ConfigError, ServerConfig, check
-from manipnet.control import Control, Handler
-from manipnet.flight_recorder import FlightRecorder
-from manipnet.mailbox import Mailbox
-from manipnet.metrics import MetricsPage
-from manipnet.network.bundle import load_bundle
-from manipnet.objects.shape import Shape
-from manipnet.page.host import LivePage
-from manipnet.placing import Placing
-from manipnet.props import Prop
-from manipnet.publisher import Publisher
-from manipnet.recorder import Recorder, carried
-from manipnet.requests import Cast, Requests
-from manipnet.status import SilenceWatch, second_line
-from manipnet.streams.intake import ListenError
-from manipnet.streams.keys import read_server_keys
-from manipnet.streams.natnet_client import NatNetBodies
-from manipnet.streams.osc import OscBodies
-from manipnet.streams.zmq_bodies import ZmqBodies
-from manipnet.surroundings import Surroundings
-from manipnet.synthesis import Synthesizer
+from manipnet.actors.actor import Actor
+from manipnet.actors.props import Prop
+from manipnet.config.settings import ActorConfig, ConfigError, ServerConfig, check
+from manipnet.control.actors_proxy import Cast
+from manipnet.control.calibration_requests import Placing
+from manipnet.control.peers import Surroundings
+from manipnet.control.request import Handler
+from manipnet.control.service import Control
+from manipnet.control.session_requests import Requests
+from manipnet.inputs.natnet.client import NatNetBodies
+from manipnet.inputs.osc.receiver import OscBodies
+from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.net.curve_keys import read_server_keys
+from manipnet.net.errors import ListenError
+from manipnet.outputs.publisher import Publisher
+from manipnet.page.supervisor import LivePage
+from manipnet.recording.recorder import Recorder, carried
+from manipnet.runtime.flight_recorder import FlightRecorder
+from manipnet.runtime.mailbox import Mailbox
+from manipnet.runtime.mesh_watch import MeshWatch
+from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.prometheus import MetricsPage
+from manipnet.runtime.status import SilenceWatch, second_line
+from manipnet.runtime.tick_loop import TickLoop
+from manipnet.runtime.warm_up import pose_a_hand, warm_up
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
-from manipnet.tick_loop import TickLoop
-from manipnet.wardrobe import MeshWatch, Wardrobe
-from manipnet.warm_up import pose_a_hand, warm_up
 
 if TYPE_CHECKING:
-    from manipnet.demo.performance import Demo
+    from manipnet.demo.player import Demo
 
 SWITCH_INTERVAL_S = 0.001
 """How long a busy thread may keep the interpreter: a receiver must not wait the usual 5 ms for a tick."""
@@ -209,7 +212,7 @@ class Server:
         )
 
     def _make_demo(self) -> "Demo":
-        from manipnet.demo.performance import Demo  # its libraries are of no use to a live session
+        from manipnet.demo.player import Demo  # its libraries are of no use to a live session
 
         if self._keys is not None:
             raise ConfigError("--demo plays through a socket that asks for keys, and has none; leave out --keys")

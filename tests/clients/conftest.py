@@ -1,21 +1,9 @@
-"""Makes the Python client and the helpers beside this file importable."""
+"""The harnesses of the clients in other languages."""
 
 import functools
-import sys
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
-HERE = Path(__file__).parent
-sys.path[:0] = [
-    str(HERE),
-    str(ROOT / "clients"),
-    str(ROOT / "clients" / "python"),
-    str(ROOT / "tests" / "vectors"),
-]
-
-from languages import build  # noqa: E402
+from languages import build
 
 
 @pytest.fixture(scope="session")

@@ -9,15 +9,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from checkout import CLIENTS, publishing
+from joint_poses import assert_joints
 from manipnet_client import decode
 from manipnet_client.retarget import BONES
-from support import CLIENTS, publishing
-from test_axes import assert_joints
 from test_retarget import ENDS, posed
 
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate, quat_to_matrix
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.streams.wire import encode_binary
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.wire import encode_binary
 
 EXTENSION = CLIENTS / "blender" / "manipnet_live"
 FAKE = ("bpy", "mathutils", "manipnet_live")

@@ -8,9 +8,9 @@ import time
 from itertools import pairwise
 
 import pytest
+from checkout import VECTORS, publishing
 from languages import NAMES, LiveClient, run
 from manipnet_client import Client
-from support import VECTORS, publishing
 
 BACK_OFF_S = (0.1, 0.2, 0.4, 0.8, 1.0)
 MANY_FRAMES, WARM_FRAMES = 3000, 200

@@ -6,7 +6,7 @@ from manipnet_client import Interpolator, decode
 from manipnet_client.spline import spline_weights
 from publisher import message
 
-from manipnet.streams.wire import encode_binary
+from manipnet.wire import encode_binary
 
 RATE_HZ = 60
 

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from checkout import VECTORS
+from joint_poses import POSES, assert_joints
 from languages import NAMES, run
 from manipnet_client import Interpolator, decode
 from publisher import message
-from support import VECTORS
-from test_axes import POSES, assert_joints
 
-from manipnet.streams.wire import encode_binary
+from manipnet.wire import encode_binary
 
 EXPECTED = json.loads((VECTORS / "expected.json").read_text(encoding="utf-8"))
 BROKEN = sorted(VECTORS.glob("bad_*.bin"))

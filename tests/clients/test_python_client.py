@@ -9,9 +9,9 @@ import threading
 import generate
 import make_vectors
 import pytest
+from checkout import VECTORS, publishing
 from manipnet_client import Client, MessageError, decode, subscribe, subscribe_async
 from manipnet_client.zmtp import parse_address
-from support import VECTORS, publishing
 
 EXPECTED = json.loads((VECTORS / "expected.json").read_text(encoding="utf-8"))
 

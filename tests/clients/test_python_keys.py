@@ -7,16 +7,16 @@ from types import SimpleNamespace
 
 import pytest
 import zmq
+from live_server import scene, serving
 from manipnet_client import Client, subscribe
 from publisher import message
 from zmq.auth.thread import ThreadAuthenticator
 
-from live_server import scene, serving
-from manipnet.objects.library import LIBRARY_FOLDER
-from manipnet.streams.bodies import BodyFrame, BodySample
-from manipnet.streams.keys import make_client_keys, make_server_keys, read_client_keys, read_server_keys
-from manipnet.streams.player import OscBodySender
-from manipnet.streams.wire import TOPIC_BIN, encode_binary
+from manipnet.inputs.playback import OscBodySender
+from manipnet.net.curve_keys import make_client_keys, make_server_keys, read_client_keys, read_server_keys
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+from manipnet.wire import TOPIC_BIN, encode_binary
+from manipnet.wire.bodies import BodyFrame, BodySample
 
 DOMAIN = "hands"
 

@@ -5,9 +5,8 @@ from collections.abc import Callable
 
 import pytest
 from languages import NAMES, LiveClient
-from manipnet_client import Client
-
 from live_server import Stage, scene
+from manipnet_client import Client
 
 RATE_HZ = 120
 LIMIT_S = 120.0

@@ -10,10 +10,10 @@ from manipnet_client import decode
 from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, matches
 
 from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.hand.skeleton import DOF_LIMITS_RAD, PARENTS
-from manipnet.streams.axes import to_unity
-from manipnet.streams.wire import encode_binary
+from manipnet.outputs.axes import to_unity
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, PARENTS
+from manipnet.wire import encode_binary
 
 ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 

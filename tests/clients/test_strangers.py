@@ -8,11 +8,11 @@ from contextlib import contextmanager
 
 import pytest
 import zmq
+from checkout import VECTORS
 from languages import LiveClient
 from publisher import message
-from support import VECTORS
 
-from manipnet.streams.wire import TOPIC_BIN, encode_binary
+from manipnet.wire import TOPIC_BIN, encode_binary
 
 ZMTP_CLIENTS = ("python", "csharp", "gcc-sanitized")
 BAD = [TOPIC_BIN + path.read_bytes() for path in sorted(VECTORS.glob("bad_*.bin")) if path.stat().st_size]

@@ -6,10 +6,10 @@ import subprocess
 import numpy as np
 import pytest
 import unity_meta
-from support import CLIENTS, ROOT, need, publishing
+from checkout import CLIENTS, ROOT, need, publishing
 
 from manipnet.geometry import quat_multiply
-from manipnet.streams.axes import to_unity
+from manipnet.outputs.axes import to_unity
 
 PACKAGE = CLIENTS / "unity" / "com.manipnet.client"
 CSHARP = ROOT / "tests" / "clients" / "csharp"

@@ -6,11 +6,11 @@ import subprocess
 
 import numpy as np
 import pytest
+from checkout import CLIENTS, ROOT, VECTORS, need, publishing
 from languages import CPP, WARNINGS, run
 from make_vectors import messages
-from support import CLIENTS, ROOT, VECTORS, need, publishing
 
-from manipnet.streams.livelink_json import hand_json
+from manipnet.outputs.livelink import hand_json
 
 PLUGIN = CLIENTS / "unreal" / "ManipNetLiveLink"
 MODULE = PLUGIN / "Source" / "ManipNetLiveLink"

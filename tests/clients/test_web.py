@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 from browser import browsing, serving
-from support import CLIENTS, ROOT, need, publishing
+from checkout import CLIENTS, ROOT, need, publishing
 
 CDN = "https://cdn.jsdelivr.net/npm/three@0.170.0"
 STUB = ROOT / "tests" / "clients" / "web" / "three-stub.js"
@@ -41,7 +41,7 @@ def test_example_page_shows_a_server_that_goes_and_comes_back(pages, tmp_path):
 
 
 def test_joint_names_are_webxr_names():
-    from manipnet.hand.joint_sets import WEBXR_JOINT_NAMES
+    from manipnet.synthesis.hand.openxr import WEBXR_JOINT_NAMES
 
     text = (CLIENTS / "web" / "layout.js").read_text(encoding="utf-8")
     for name in WEBXR_JOINT_NAMES:

@@ -13,8 +13,8 @@ from typing import Any
 import fuzz_paths  # noqa: F401 (must come before the writers)
 from mcap.writer import CompressionType, Writer
 
-from manipnet.recording import BODIES, RecordingWriter, read_about, read_bodies, read_hands
-from manipnet.streams.bodies import parse_bodies
+from manipnet.recording.mcap_file import BODIES, RecordingWriter, read_about, read_bodies, read_hands
+from manipnet.wire.bodies import parse_bodies
 
 SHARED = Path("/dev/shm")
 FOLDER = Path(tempfile.mkdtemp(prefix="manipnet-fuzz-", dir=SHARED if SHARED.is_dir() else None))

@@ -1,6 +1,6 @@
-"""Makes what writes good inputs for the tests importable, also when a fuzzer runs outside pytest."""
+"""Makes what writes good inputs for the tests importable when a fuzzer runs outside pytest."""
 
 import sys
 from pathlib import Path
 
-sys.path += [str(Path(__file__).parents[1] / "streams"), str(Path(__file__).parents[1])]
+sys.path.append(str(Path(__file__).parents[1] / "support"))

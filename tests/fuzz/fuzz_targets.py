@@ -13,15 +13,15 @@ from fuzz_damage import damaged, reshaped
 from fuzz_files import ACTORS, RIG, bundles, place_recording, place_rig, read_recording, recordings, toml
 from osc_writer import bundle, osc
 
-from manipnet.config import ConfigError
-from manipnet.network.bundle import BundleError, load_bundle
-from manipnet.recording import RecordingError
-from manipnet.rig import load_rig
-from manipnet.streams.bodies import MessageError, parse_bodies
-from manipnet.streams.natnet import read_echo, read_packet, read_server_info
-from manipnet.streams.natnet_frames import read_body_names, read_frame
-from manipnet.streams.osc_frames import FrameAssembler
-from manipnet.streams.osc_packet import split_packet
+from manipnet.config.rig_reader import load_rig
+from manipnet.config.settings import ConfigError
+from manipnet.inputs.natnet.frames import read_body_names, read_frame
+from manipnet.inputs.natnet.protocol import read_echo, read_packet, read_server_info
+from manipnet.inputs.osc.assembler import FrameAssembler
+from manipnet.inputs.osc.packet import split_packet
+from manipnet.recording.mcap_file import RecordingError
+from manipnet.synthesis.model.bundle import BundleError, load_bundle
+from manipnet.wire.bodies import MessageError, parse_bodies
 
 VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5)]
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
-from manipnet.network.bundle import FORMAT
-from manipnet.network.features import pose_outputs
-from manipnet.network.layout import INPUT_SIZE, OUTPUT_SIZE, describe
-from manipnet_tools.cases import Case, load_cases
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
+from manipnet.synthesis.model.bundle import FORMAT
+from manipnet.synthesis.model.features import pose_outputs
+from manipnet.synthesis.model.layout import INPUT_SIZE, OUTPUT_SIZE, describe
+from manipnet_tools.evaluation.cases import Case, load_cases
 
 TAKES = ("cyl_med3", "mug1")
 STILL_ANGLES = np.clip(np.full(20, 0.2), DOF_LIMITS_RAD[:, 0], DOF_LIMITS_RAD[:, 1])

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from manipnet.streams.wire import BodyPose, HandPose, HandsMessage, Latency, encode_binary, encode_msgpack
-from manipnet.streams.wire.schema import BODY, HAND, HEADER, NAME, PREAMBLE
+from manipnet.wire import BodyPose, HandPose, HandsMessage, Latency, encode_binary, encode_msgpack
+from manipnet.wire.hands import BODY, HAND, HEADER, NAME, PREAMBLE
 
 FOLDER = Path(__file__).parent
 

@@ -23,7 +23,7 @@ VERBS = {
     "serve": Verb("fingers live from tracked wrists and props (same as manipnet-serve)", "manipnet.cli"),
     "replay": Verb(
         "send a take to a server, as the tracker would",
-        "manipnet_tools.replay",
+        "manipnet_tools.commands.replay",
         "ReplayOptions",
         (
             "takes/mug1 --to tcp://127.0.0.1:5556             to a server on this machine",
@@ -33,7 +33,7 @@ VERBS = {
     ),
     "record": Verb(
         "write what is tracked and synthesised to a recording",
-        "manipnet_tools.record",
+        "manipnet_tools.commands.record",
         "RecordOptions",
         (
             "--out take.mcap                          beside a running server, until Ctrl-C",
@@ -43,13 +43,13 @@ VERBS = {
     ),
     "recover": Verb(
         "mend a recording that was cut off",
-        "manipnet_tools.recover",
+        "manipnet_tools.commands.recover",
         "RecoverOptions",
         ("take.mcap --out mended.mcap",),
     ),
     "synthesize": Verb(
         "fingers for a take, offline",
-        "manipnet_tools.synthesize",
+        "manipnet_tools.commands.synthesize",
         "SynthesizeOptions",
         (
             "takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz",
@@ -79,7 +79,7 @@ VERBS = {
     ),
     "evaluate": Verb(
         "judge models on captured takes",
-        "manipnet_tools.evaluate",
+        "manipnet_tools.evaluation.command",
         "EvaluateOptions",
         (
             "--data DATASET                                    the shipped model on the last 20 % of every take",
@@ -88,19 +88,19 @@ VERBS = {
     ),
     "train": Verb(
         "train a model on captured takes",
-        "manipnet_tools.train",
+        "manipnet_tools.training.train",
         "TrainOptions",
         ("--data DATASET --out models/mine",),
     ),
     "ablate": Verb(
         "train and judge the rows of the paper's Table 1",
-        "manipnet_tools.ablate",
+        "manipnet_tools.evaluation.ablate",
         "AblateOptions",
         ("--data DATASET --out ablation                both protocols, 49 short trainings",),
     ),
     "quantise": Verb(
         "write a bundle again with 8-bit weights",
-        "manipnet_tools.compress",
+        "manipnet_tools.training.quantise",
         "QuantiseOptions",
         ("manipnet-full --out models/manipnet-full-int8",),
     ),
@@ -112,7 +112,7 @@ VERBS = {
     ),
     "doctor": Verb(
         "say why no tracked bodies arrive",
-        "manipnet.doctor",
+        "manipnet_tools.doctor.command",
         None,
         (
             "                                listen where the server would, for 5 s",
@@ -120,10 +120,10 @@ VERBS = {
             "--natnet 192.168.1.5            ask Motive there",
         ),
     ),
-    "rig": Verb("write a rig file from what is heard, or show a configuration", "manipnet_tools.rig"),
+    "rig": Verb("write a rig file from what is heard, or show a configuration", "manipnet_tools.commands.rig"),
     "calibrate": Verb(
         "find where the wrists sit on their bodies, and the size of the hands",
-        "manipnet_tools.calibrate",
+        "manipnet_tools.commands.calibrate",
         "CalibrateOptions",
         (
             "--hand-length 0.19                       sheet at the world's origin, beside a running server",
@@ -131,7 +131,7 @@ VERBS = {
             "--reference Box --fingertips             sheet under the tracked box; measure the hand length",
         ),
     ),
-    "keys": Verb("make and list the keys that let clients in over the network", "manipnet.keys"),
+    "keys": Verb("make and list the keys that let clients in over the network", "manipnet_tools.commands.keys"),
 }
 
 EXAMPLES = """examples:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import viser
 
 if TYPE_CHECKING:
-    from manipnet.page.process import Page
+    from manipnet.page.app import Page
 
 COUNTDOWN_S: Final = 3
 """From the click to the request, which looks back 2 s: the hand that clicked must lie still by then."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.streams.wire import HandsMessage, Side
+from manipnet.wire import HandsMessage, Side
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import viser
 
-from manipnet.config import SCALE_RANGE
+from manipnet.config.settings import SCALE_RANGE
 from manipnet.geometry import Array, quat_exp, quat_log
-from manipnet.objects.mesh import FORMATS, UNITS_M
 from manipnet.page.frames import Frame
-from manipnet.page.handles import Handles
+from manipnet.page.gizmo import Handles
+from manipnet.synthesis.objects.mesh import FORMATS, UNITS_M
 
 if TYPE_CHECKING:
-    from manipnet.page.process import Page
+    from manipnet.page.app import Page
 
 NONES: Final[tuple[str, ...]] = ("none",)
 Doing = Callable[[Callable[[], str | None]], None]

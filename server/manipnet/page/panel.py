@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import viser
 
 from manipnet.page.calibrate_tab import CalibrateTab
+from manipnet.page.charts import History, Plots
 from manipnet.page.frames import Frame
-from manipnet.page.layers import LAYERS
-from manipnet.page.link import RefusedError
 from manipnet.page.objects_tab import ObjectsTab
-from manipnet.page.plots import History, Plots
+from manipnet.page.overlays import LAYERS
+from manipnet.page.rpc import RefusedError
 from manipnet.page.takes_tab import TakesTab
 
 if TYPE_CHECKING:
-    from manipnet.page.process import Page
+    from manipnet.page.app import Page
 
 DOTS = {"live": "●", "hold": "◐", "rest": "○"}
 NOTE_S = 6.0

@@ -6,12 +6,12 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipnet.actor import ON_THE_BODY
-from manipnet.objects.library import library_names, load_library_mesh
-from manipnet.objects.mesh import ClosedMesh, MeshError, load_mesh
+from manipnet.actors.actor import ON_THE_BODY
 from manipnet.page.frames import Frame, PropView, ShapeView
-from manipnet.recording import About, RecordingError, read_about, read_hands
-from manipnet.streams.wire import HandsMessage
+from manipnet.recording.mcap_file import About, RecordingError, read_about, read_hands
+from manipnet.synthesis.objects.library import library_names, load_library_mesh
+from manipnet.synthesis.objects.mesh import ClosedMesh, MeshError, load_mesh
+from manipnet.wire import HandsMessage
 
 
 @dataclass(frozen=True, eq=False)

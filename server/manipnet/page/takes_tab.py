@@ -11,7 +11,7 @@ import viser
 from manipnet.page.playback import read_recording
 
 if TYPE_CHECKING:
-    from manipnet.page.process import Page
+    from manipnet.page.app import Page
 
 PLAY_HZ: Final = 30.0
 NONE: Final[str] = "none"

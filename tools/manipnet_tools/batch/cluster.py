@@ -18,7 +18,7 @@ from ray.exceptions import RayError
 
 from manipnet_tools.batch.job import Job, Outcome, do, failure, finished, keep, prepare, take_files
 from manipnet_tools.batch.local import Progress
-from manipnet_tools.rigged import RigText
+from manipnet_tools.takes.rigged import RigText
 
 OWN: Final = "local"
 """In the place of an address: a cluster of our own on this machine, for as long as the batch takes."""

@@ -13,12 +13,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from manipnet.network.bundle import DEFAULT_MODEL, load_bundle
-from manipnet.objects.mesh import load_mesh
-from manipnet.timeline import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet_tools.batch.job import Job, Outcome, keep
 from manipnet_tools.batch.local import run_here
-from manipnet_tools.rigged import read_rig
+from manipnet_tools.takes.rigged import read_rig
 
 FILE_TAKES = (".csv", ".mcap", ".txt")
 SUMMARY = "summary.json"

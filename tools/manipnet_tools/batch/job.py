@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Literal
 
 from manipnet import __version__
-from manipnet.network.bundle import Bundle, load_bundle
-from manipnet.synthesis import Synthesizer
-from manipnet_tools.rigged import RigText, Staged, read_staged
-from manipnet_tools.rollout import tick_take
-from manipnet_tools.synthesize import read_shapes, synthesise, write_arrays
-from manipnet_tools.takes import TakeError
+from manipnet.synthesis.model.bundle import Bundle, load_bundle
+from manipnet.synthesis.synthesizer import Synthesizer
+from manipnet_tools.commands.synthesize import read_shapes, synthesise, write_arrays
+from manipnet_tools.takes.rigged import RigText, Staged, read_staged
+from manipnet_tools.takes.rollout import tick_take
+from manipnet_tools.takes.take import TakeError
 
 Advance = Callable[[int, int], None]
 """Hears how many hand-ticks are done, of how many."""

@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from manipnet.network.bundle import DEFAULT_MODEL, PROVIDERS, load_bundle
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, PROVIDERS
 from manipnet_tools.bench.machine import this_machine
 from manipnet_tools.bench.models import full_width
-from manipnet_tools.bench.performances import Performance, demo, take
 from manipnet_tools.bench.reference import forward_pass
 from manipnet_tools.bench.report import lines, with_ratios
+from manipnet_tools.bench.scenarios import Performance, demo, take
 from manipnet_tools.bench.sections import SECTIONS, USUAL, Bench, Figures
-from manipnet_tools.takes import TakeError
+from manipnet_tools.takes.take import TakeError
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -19,11 +19,11 @@ import numpy as np
 import trimesh
 import zmq
 
-from manipnet.streams.bodies import BodyFrame
-from manipnet.streams.player import ZmqBodySender, play
-from manipnet.streams.wire import TOPIC_MSGPACK
+from manipnet.inputs.playback import ZmqBodySender, play
+from manipnet.wire import TOPIC_MSGPACK
+from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.bench.machine import resident_mb
-from manipnet_tools.bench.performances import Performance, endless
+from manipnet_tools.bench.scenarios import Performance, endless
 from manipnet_tools.bench.shapes import gourd
 
 START_S = 300.0

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manipnet.network.bundle import Bundle, BundleError, load_bundle, open_session
-from manipnet.network.layout import OUTPUT
+from manipnet.synthesis.model.bundle import Bundle, BundleError, load_bundle, open_session
+from manipnet.synthesis.model.layout import OUTPUT
 from manipnet_tools.bench.reference import full_graph
 
 FULL = "manipnet-full-int8"
@@ -38,7 +38,7 @@ def shipped_full_width() -> Bundle | None:
 
 def quantised(full: FullWidth) -> Bundle:
     """The same with 8-bit weights. Raises `ModuleNotFoundError` without onnx."""
-    from manipnet_tools.compress import quantise_weights
+    from manipnet_tools.training.quantise import quantise_weights
 
     session = open_session("quantised", quantise_weights(full.content))
     return replace(full.bundle, name="full width, quantised", session=session)

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import onnxruntime
 
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.network.bundle import open_session
-from manipnet.network.features import pose_outputs
-from manipnet.network.layout import ENCODED, INPUT_SIZE, OUTPUT_SIZE
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.model.bundle import open_session
+from manipnet.synthesis.model.features import pose_outputs
+from manipnet.synthesis.model.layout import ENCODED, INPUT_SIZE, OUTPUT_SIZE
 
 WIDTH = 1536
 HANDS = 2

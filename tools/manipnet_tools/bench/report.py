@@ -4,8 +4,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from manipnet_tools.bench.harness import STAGES, TURN
 from manipnet_tools.bench.machine import Machine
-from manipnet_tools.bench.rigs import STAGES, TURN
 
 Figures = dict[str, Any]
 _SHOWN = ("sense", "infer", "ik")

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from manipnet.network.bundle import Bundle
-from manipnet.network.features import features
-from manipnet.objects.shape import build_shape
-from manipnet.synthesis import windows_of
+from manipnet.synthesis.model.bundle import Bundle
+from manipnet.synthesis.model.features import features
+from manipnet.synthesis.objects.shape import build_shape
+from manipnet.synthesis.synthesizer import windows_of
+from manipnet_tools.bench.harness import STAGES, Race, Rig, memory, race
 from manipnet_tools.bench.live import end_to_end, serving, starts
 from manipnet_tools.bench.models import FullWidth, apart_m, quantised, shipped_full_width
-from manipnet_tools.bench.performances import Performance
 from manipnet_tools.bench.reference import WIDTH
-from manipnet_tools.bench.rigs import STAGES, Race, Rig, memory, race
+from manipnet_tools.bench.scenarios import Performance
 from manipnet_tools.bench.shapes import gourd
 
 TRIANGLES = (12, 100, 1000, 5000, 20_000, 80_000, 200_000)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from manipnet.objects.mesh import ClosedMesh, closed_mesh
+from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 
 HEIGHT_M = 0.11
 RADIUS_M = 0.035

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import Array, mirror_points, mirror_quats
-from manipnet.hand.skeleton import BONE_COUNT, JOINT_NAMES, PARENTS
-from manipnet_tools.export.performance import ExportError, HandTrack, Performance
+from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_NAMES, PARENTS
+from manipnet_tools.export.animation import ExportError, HandTrack, Performance
 
 DECIMETRES_PER_M = 10.0
 CENTIMETRES_PER_M = 100.0

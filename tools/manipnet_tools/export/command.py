@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 import tyro
 from rich.console import Console
 
-from manipnet.objects.mesh import load_mesh
+from manipnet.synthesis.objects.mesh import load_mesh
+from manipnet_tools.export.animation import ExportError, Performance, read_performance, with_meshes
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf
-from manipnet_tools.export.performance import ExportError, Performance, read_performance, with_meshes
-from manipnet_tools.meshes import named_files
+from manipnet_tools.takes.meshes import named_files
 
 SUFFIXES = {"gltf": (".glb", ".gltf"), "csv": (".csv",)}
 

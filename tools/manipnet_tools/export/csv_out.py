@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from manipnet.geometry import Array, mirror_quats, quat_conjugate, quat_multiply, quat_to_matrix
-from manipnet.hand.kinematics import angles_from_rotations
-from manipnet.hand.skeleton import DOF_NAMES, JOINT_NAMES
-from manipnet.synthesis import Side
-from manipnet_tools.export.performance import HandTrack, Performance
+from manipnet.synthesis.hand.kinematics import angles_from_rotations
+from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from manipnet.synthesis.synthesizer import Side
+from manipnet_tools.export.animation import HandTrack, Performance
 
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 

@@ -1,6 +1,7 @@
 """Hands and objects as glTF 2.0: both hands as skinned meshes with their skeletons, objects, and one animation.
 
-Right-handed, Y up, metres, as glTF wants it. Time starts at the first frame. The skin is `manipnet.hand.surface`.
+Right-handed, Y up, metres, as glTF wants it. Time starts at the first frame. The skin is
+`manipnet.synthesis.hand.surface`.
 """
 
 from collections.abc import Mapping
@@ -12,15 +13,15 @@ from numpy.typing import NDArray
 
 from manipnet import __version__
 from manipnet.geometry import MIRROR, Array, mirror_points
-from manipnet.hand.bind import BIND_ANGLES_RAD
-from manipnet.hand.kinematics import forward_kinematics
-from manipnet.hand.skeleton import BONE_COUNT, JOINT_COUNT, JOINT_NAMES, PARENTS
-from manipnet.hand.surface import BONES, FACES, VERTICES, WEIGHTS
-from manipnet.objects.mesh import ClosedMesh
-from manipnet.streams.wire import Side
+from manipnet.synthesis.hand.bind_pose import BIND_ANGLES_RAD
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_COUNT, JOINT_NAMES, PARENTS
+from manipnet.synthesis.hand.surface import BONES, FACES, VERTICES, WEIGHTS
+from manipnet.synthesis.objects.mesh import ClosedMesh
+from manipnet.wire import Side
+from manipnet_tools.export.animation import HandTrack, Performance
 from manipnet_tools.export.glb import ATTRIBUTE, INDEX, Buffer
-from manipnet_tools.export.performance import HandTrack, Performance
-from manipnet_tools.render import CERAMIC, SKIN_LEFT, SKIN_RIGHT, corner_normals
+from manipnet_tools.rendering import CERAMIC, SKIN_LEFT, SKIN_RIGHT, corner_normals
 
 _COLOURS: Mapping[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right": SKIN_RIGHT}
 

@@ -1,0 +1,180 @@
+"""Rig files written: a whole configuration as one, and what was calibrated put into one that is there."""
+
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+from tomlkit.items import InlineTable
+
+from manipnet.config.rig_reader import SERVER_KEYS, parse_rig
+from manipnet.config.settings import ActorConfig, BodyConfig, ConfigError, ObjectConfig, ServerConfig
+from manipnet.geometry import Array
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+
+BACKUP_SUFFIX: Final = ".bak"
+_METRE_DIGITS, _QUATERNION_DIGITS = 6, 8
+
+
+def rig_text(config: ServerConfig) -> str:
+    """A configuration as the text of a rig file, which read again gives the same one; paths become absolute."""
+    document = tomlkit.document()
+    if len(config.actors) == 1 and config.actors[0].name == "actor":
+        for key, value in _actor(config.actors[0]).items():
+            document[key] = value
+    document["server"] = server_table(config)
+    if "bodies" not in document:
+        actors = tomlkit.aot()
+        for actor in config.actors:
+            actors.append(tomlkit.item({"name": actor.name} | _actor(actor)))
+        document["actors"] = actors
+    return tomlkit.dumps(document)
+
+
+def server_table(config: ServerConfig) -> dict[str, Any]:
+    """The table `[server]` of a configuration: every option that has a value."""
+    values = {key: getattr(config, "look_ahead_s" if key == "look_ahead" else key) for key in SERVER_KEYS}
+    return {key: _plain(value) for key, value in values.items() if value not in (None, ())}
+
+
+def store(path: Path, actor: ActorConfig, backup: bool = True) -> Path:
+    """Put where the actor's wrists and props sit, and the size of its hands, into a rig file; returns the `backup`'s
+    path. Whatever else is in the file stays as it is, comments too.
+
+    Raises `ConfigError`, and the file is as it was.
+    """
+    path = path.resolve()
+    try:
+        before = path.read_bytes()
+        text = before.decode("utf-8-sig")
+        after = _with_placements(text, actor)
+        _check(after, path, actor)
+        return replace_file(path, after, backup)
+    except (OSError, ValueError, TOMLKitError, KeyError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ConfigError(
+            f"{path}: could not be changed ({reason}); put these lines in yourself:\n{_lines(actor)}"
+        ) from (None)
+
+
+def replace_file(path: Path, text: str, backup: bool = True) -> Path:
+    """Write a file so that at any time either the old or the new one is there whole; the old one is kept beside it
+    if there is to be a `backup`. Returns the backup's path. Raises `OSError`.
+    """
+    kept = path.with_name(path.name + BACKUP_SUFFIX)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with open(part, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        if path.exists():
+            shutil.copymode(path, part)
+            if backup:
+                shutil.copy2(path, kept)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+    return kept
+
+
+def _with_placements(text: str, actor: ActorConfig) -> str:
+    document: Any = tomlkit.parse(text)
+    table = document
+    if "actors" in document:
+        table = next((entry for entry in document["actors"] if entry["name"] == actor.name), None)
+        if table is None:
+            raise ConfigError(f"it has no actor {actor.name!r} any more")
+    for wrist, body in actor.wrists.items():
+        if body.offset is not None:
+            _place(table["bodies"], wrist, body)
+    for thing in actor.objects:
+        if thing.body.offset is not None:
+            entry = next((entry for entry in table["objects"] if _is(entry, thing)), None)
+            if entry is None:
+                raise ConfigError(f"it has no object {thing.name!r} any more")
+            entry.update(_offset(thing.body.offset))
+    if actor.hand_scale != table.get("hand_scale", 1.0):
+        table["hand_scale"] = round(actor.hand_scale, 4)
+    return tomlkit.dumps(document)
+
+
+def _place(bodies: Any, wrist: str, body: BodyConfig) -> None:
+    if isinstance(bodies.get(wrist), dict):
+        bodies[wrist].update(_offset(body.offset))
+    else:
+        bodies[wrist] = _body(body)
+
+
+def _is(entry: Mapping[str, Any], thing: ObjectConfig) -> bool:
+    return entry.get("name", str(entry["body"])) == thing.name
+
+
+def _check(text: str, path: Path, actor: ActorConfig) -> None:
+    """Raise `ConfigError` unless the text says of the actor what it should."""
+    read = next(other for other in parse_rig(text, path.parent, str(path)).actors if other.name == actor.name)
+    wanted = [*actor.wrists.values(), *(thing.body for thing in actor.objects)]
+    found = [*read.wrists.values(), *(thing.body for thing in read.objects)]
+    for a, b in zip(wanted, found, strict=True):
+        if a.offset is not None and (b.offset is None or not np.allclose(a.offset, b.offset, atol=1e-4)):
+            raise ConfigError(f"the place of body {a.key!r} cannot be found in it")
+
+
+def _actor(actor: ActorConfig) -> dict[str, Any]:
+    table: dict[str, Any] = {"hand_scale": actor.hand_scale} if actor.hand_scale != 1.0 else {}
+    table["bodies"] = {wrist: _body(body) for wrist, body in actor.wrists.items()}
+    if actor.limits:
+        ends = {name: [_degrees(low), _degrees(high)] for name, (low, high) in actor.limits.items()}
+        table["limits_deg"] = ends
+    if actor.objects:
+        table["objects"] = [_object(thing) for thing in actor.objects]
+    return table
+
+
+def _object(thing: ObjectConfig) -> dict[str, Any]:
+    mesh = thing.mesh.resolve()
+    table = {"body": thing.body.key, "mesh": mesh.stem if mesh.parent == LIBRARY_FOLDER.resolve() else str(mesh)}
+    defaults = {"name": str(thing.body.key), "unit": "m", "scale": 1.0}
+    table |= {key: getattr(thing, key) for key, value in defaults.items() if getattr(thing, key) != value}
+    return table | _offset(thing.body.offset)
+
+
+def _body(body: BodyConfig) -> Any:
+    if body.offset is None:
+        return body.key
+    table: InlineTable = tomlkit.inline_table()
+    table.update({"body": body.key} | _offset(body.offset))
+    return table
+
+
+def _offset(offset: Array | None) -> dict[str, Any]:
+    if offset is None:
+        return {}
+    position = [round(float(x), _METRE_DIGITS) + 0.0 for x in offset[:3]]
+    rotation = [round(float(x), _QUATERNION_DIGITS) + 0.0 for x in offset[3:]]
+    return {"position": position, "rotation": rotation}
+
+
+def _degrees(radians: float) -> float:
+    return round(float(np.degrees(radians)), 6)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Path):
+        return str(value.resolve())
+    if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], int):
+        host, port = value
+        return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    return [str(network) for network in value] if isinstance(value, tuple) else value
+
+
+def _lines(actor: ActorConfig) -> str:
+    """What belongs into a rig file for an actor's placements."""
+    bodies = {wrist: _body(body) for wrist, body in actor.wrists.items()}
+    objects = [_object(thing) for thing in actor.objects if thing.body.offset is not None]
+    table = {"hand_scale": round(actor.hand_scale, 4), "bodies": bodies} | ({"objects": objects} if objects else {})
+    return tomlkit.dumps(table)

@@ -1,0 +1,89 @@
+"""The text of a rig file as a tree, what a command line sets on top of it, and where each key stands."""
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from manipnet.config.settings import ConfigError
+
+Place = tuple[str | int, ...]
+"""Keys from the top down; an entry of a list of tables by its index."""
+
+_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]#]+?)\s*\]\]?\s*(#.*)?$")
+_ASSIGNMENT = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
+
+
+def read_tree(text: str, where: str, settings: Sequence[str] = ()) -> tuple[dict[str, Any], dict[Place, str]]:
+    """What a text says, `settings` `KEY=VALUE` on top, and how errors call the place of each key.
+
+    Raises `ConfigError`.
+    """
+    try:
+        tree = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ConfigError(f"{where}: not TOML: {error}") from None
+    places = {at: f"{where}:{line}" for at, line in key_lines(text).items()}
+    for setting in settings:
+        change = _parse_setting(setting)
+        tree = _merged(tree, change)
+        places |= dict.fromkeys(_paths(change), f"--set {setting}")
+    return tree, places
+
+
+def _parse_setting(setting: str) -> dict[str, Any]:
+    """`KEY=VALUE` as TOML; a value that is none is text, so names need no quotes."""
+    key, equals, value = setting.partition("=")
+    for line in (setting, f"{key} = {json.dumps(value.strip())}") if equals else ():
+        try:
+            return tomllib.loads(line)
+        except (ValueError, RecursionError):
+            continue
+    raise ConfigError(f"--set {setting}: is no KEY=VALUE as in a rig file, for example bodies.left_wrist=3")
+
+
+def _merged(old: Any, new: Any) -> Any:
+    if not (isinstance(old, dict) and isinstance(new, dict)):
+        return new
+    return {**old, **{key: _merged(old.get(key), value) for key, value in new.items()}}
+
+
+def _paths(tree: Mapping[str, Any], at: Place = ()) -> list[Place]:
+    """Of every leaf."""
+    return [
+        path
+        for key, value in tree.items()
+        for path in (_paths(value, (*at, key)) if isinstance(value, dict) and value else [(*at, key)])
+    ]
+
+
+def key_lines(text: str) -> dict[Place, int]:
+    """Line of each table and key of a TOML text, by path; list entries by index. Good enough for messages."""
+    lines: dict[Place, int] = {}
+    counts: dict[Place, int] = {}
+    table: Place = ()
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := _HEADER.match(line):
+            table = _resolve(_split(header[2]), counts)
+            if header[1] == "[[":
+                counts[table] = counts.get(table, -1) + 1
+                table = (*table, counts[table])
+            lines.setdefault(table, number)
+        elif assignment := _ASSIGNMENT.match(line):
+            lines.setdefault((*table, *_split(assignment[1])), number)
+    return lines
+
+
+def _split(dotted: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+
+
+def _resolve(path: Place, counts: dict[Place, int]) -> Place:
+    """The path with the current index after every list of tables on the way, but for the last."""
+    resolved: Place = ()
+    for i, key in enumerate(path):
+        resolved = (*resolved, key)
+        if i < len(path) - 1 and resolved in counts:
+            resolved = (*resolved, counts[resolved])
+    return resolved

@@ -1,0 +1,80 @@
+"""Who is around a server: senders, clients, Motive, and the clocks of them all, for `status` and for the metrics."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Final
+
+from manipnet.control.request import Handler, Request, RequestError, number
+from manipnet.inputs.base import Sink
+from manipnet.inputs.natnet.client import STATES, NatNetBodies
+from manipnet.inputs.sender_stats import Senders
+from manipnet.runtime.prometheus import Gauge
+from manipnet.wire.bodies import MessageError, check_name
+
+MOST_CLOCKS: Final = 64
+MAX_OFFSET_S: Final = 1e10
+
+
+class Surroundings:
+    """Knows the sockets of one server. Its `sink` is where the receivers leave frames. From any thread."""
+
+    def __init__(self, sink: Sink) -> None:
+        self.sink = Senders(sink)
+        self.motive: NatNetBodies | None = None
+        self.connected: Callable[[], Mapping[str, int]] = dict
+        """How many are connected at present, by socket."""
+        self._lock = threading.Lock()
+        self._clocks: dict[str, tuple[float, float, float]] = {}
+
+    def handlers(self, status: Handler) -> dict[str, Handler]:
+        """`ping`, and `status` with what there is to say beside the answer of the given one."""
+        return {"ping": self._ping, "status": lambda request: {**status(request), **self._report()}}
+
+    def gauges(self) -> Iterator[Gauge]:
+        """What is measured at this moment."""
+        yield "connections", "socket", dict(self.connected())
+        if self.motive is None:
+            return
+        motive = self.motive.status()
+        yield "natnet_state", "state", {state: float(state == motive["state"]) for state in STATES}
+        for name in ("clock_offset", "clock_uncertainty", "capture_offset"):
+            value = motive[f"{name}_s"]
+            yield f"{name}_seconds", "clock", {} if value is None else {"natnet": value}
+
+    def _ping(self, request: Request) -> dict[str, Any]:
+        """The server's monotonic clock; takes note of what who asks has found out about its own clock."""
+        now_s = time.monotonic()
+        if "name" in request:
+            try:
+                name = check_name(request["name"], "name")
+            except MessageError as error:
+                raise RequestError(str(error)) from None
+            offset_s = number(request, "offset", -MAX_OFFSET_S, MAX_OFFSET_S)
+            uncertainty_s = number(request, "uncertainty", 0.0, MAX_OFFSET_S)
+            with self._lock:
+                self._clocks.pop(name, None)
+                if len(self._clocks) >= MOST_CLOCKS:
+                    del self._clocks[next(iter(self._clocks))]
+                self._clocks[name] = (offset_s, uncertainty_s, now_s)
+        return {"t": now_s}
+
+    def _report(self) -> dict[str, Any]:
+        now_s = time.monotonic()
+        report: dict[str, Any] = {"senders": self.sink.report(now_s), "connections": dict(self.connected())}
+        with self._lock:
+            report["clocks"] = {
+                name: {"clock_offset_s": offset_s, "clock_uncertainty_s": uncertainty_s, "age_s": now_s - at_s}
+                for name, (offset_s, uncertainty_s, at_s) in self._clocks.items()
+            }
+        if self.motive is not None:
+            motive = report["natnet"] = self.motive.status()
+            if motive["capture_offset_s"] is not None:
+                measured = {
+                    "clock_offset_s": motive["capture_offset_s"],
+                    "clock_uncertainty_s": motive["clock_uncertainty_s"],
+                }
+                for source, sender in report["senders"].items():
+                    if source.startswith("natnet:"):
+                        sender |= measured
+        return report

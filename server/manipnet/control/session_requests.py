@@ -1,0 +1,164 @@
+"""What clients may ask of a running server. Handlers run on the control thread and touch the actors only through the
+mailbox, between two ticks."""
+
+import base64
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from manipnet import __version__
+from manipnet.actors.props import Prop
+from manipnet.config.settings import SCALE_RANGE
+from manipnet.control.actors_proxy import Cast, body_key
+from manipnet.control.request import Handler, Request, RequestError, choice, number
+from manipnet.geometry import Array
+from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.status import status
+from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
+from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
+from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.objects.mesh import UNITS_M, MeshError
+from manipnet.telemetry import Counters, Timings
+from manipnet.tracking.timeline import TICK_HZ
+from manipnet.wire import VERSION
+
+MAX_PATH: Final = 1024
+
+
+class Requests:
+    """The operations of `docs/protocol.md`, Control."""
+
+    def __init__(
+        self,
+        session: str,
+        model: str,
+        model_hash: str,
+        cast: Cast,
+        wardrobe: Wardrobe,
+        counters: Counters,
+        timings: Timings,
+    ) -> None:
+        self._session, self._model, self._model_hash = session, model, model_hash
+        self._cast, self._actors, self._wardrobe = cast, cast.actors, wardrobe
+        self._counters, self._timings = counters, timings
+        self._started_s = time.monotonic()
+
+    def handlers(self) -> Mapping[str, Handler]:
+        """One function per operation."""
+        return {
+            "hello": self._hello,
+            "status": self._status,
+            "objects": self._objects,
+            "mesh": self._mesh,
+            "select_object": self._select_object,
+            "add_object": self._add_object,
+            "look_ahead": self._look_ahead,
+            "rest": self._rest,
+            "pause": self._pause,
+        }
+
+    def _hello(self, _: Request) -> dict[str, Any]:
+        return {
+            "version": __version__,
+            "schema": VERSION,
+            "session": self._session,
+            "model": self._model,
+            "model_hash": self._model_hash,
+            "tick_hz": TICK_HZ,
+            "actors": [actor.config.name for actor in self._actors],
+            "joint_names": list(JOINT_NAMES),
+            "angle_names": list(DOF_NAMES),
+            "openxr_joint_names": list(OPENXR_JOINT_NAMES),
+            "objects": list(self._wardrobe.names()),
+        }
+
+    def _status(self, _: Request) -> dict[str, Any]:
+        now_s = time.monotonic()
+        report = self._cast.ask(lambda: status(self._actors, self._counters, self._timings, now_s))
+        return {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s, **report}
+
+    def _objects(self, _: Request) -> dict[str, Any]:
+        def carried() -> dict[str, Any]:
+            return {
+                actor.config.name: {prop.name: _prop(prop) | placement(actor.offset(prop.name)) for prop in actor.props}
+                for actor in self._actors
+            }
+
+        return {
+            "objects": list(self._wardrobe.names()),
+            "bodies": self._cast.ask(carried),
+            "problems": self._wardrobe.problems(),
+        }
+
+    def _mesh(self, request: Request) -> dict[str, Any]:
+        actor = self._cast.actor(request)
+        props = {prop.name: prop for prop in self._cast.ask(lambda: list(actor.props))}
+        prop = props[choice(request, "body", tuple(props))]
+        mesh = prop.shape.mesh
+        return {
+            "actor": actor.config.name,
+            "body": prop.name,
+            **_prop(prop),
+            "vertices": base64.b64encode(mesh.vertices.astype("<f4").tobytes()).decode(),
+            "faces": base64.b64encode(mesh.faces.astype("<u4").tobytes()).decode(),
+        }
+
+    def _select_object(self, request: Request) -> dict[str, Any]:
+        actor = self._cast.actor(request)
+        body = body_key(request)
+        name = choice(request, "object", self._wardrobe.names())
+        scale = number(request, "scale", *SCALE_RANGE, default=1.0)
+        try:
+            shape = self._wardrobe.shape(name)  # may take a second, on this thread
+        except MeshError as error:
+            raise RequestError(str(error)) from None
+        prop, seq = self._cast.ask(lambda: (actor.carry(body, name, shape, scale), actor.seq))
+        return {"actor": actor.config.name, "body": prop.name, **_prop(prop), "seq": seq}
+
+    def _add_object(self, request: Request) -> dict[str, Any]:
+        file = request.get("file")
+        if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH:
+            raise RequestError("file is missing or no text; give the path of a mesh on the server's machine")
+        try:
+            shape = self._wardrobe.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))
+        except MeshError as error:
+            raise RequestError(str(error)) from None
+        return {"object": shape.name}
+
+    def _look_ahead(self, request: Request) -> dict[str, Any]:
+        seconds = number(request, "seconds", 0.0, MAX_LOOK_AHEAD_S)
+
+        def change() -> None:
+            for actor in self._actors:
+                actor.timeline.look_ahead_s = seconds
+
+        self._cast.ask(change)
+        return {"seconds": seconds}
+
+    def _rest(self, request: Request) -> dict[str, Any]:
+        actors = self._actors if request.get("actor") is None else [self._cast.actor(request)]
+        self._cast.ask(lambda: [actor.rest() for actor in actors])
+        return {"actors": [actor.config.name for actor in actors]}
+
+    def _pause(self, request: Request) -> dict[str, Any]:
+        on = request.get("on", True)
+        if not isinstance(on, bool):
+            raise RequestError(f"on is {on!r:.60}; allowed are true and false")
+        actors = self._actors if request.get("actor") is None else [self._cast.actor(request)]
+
+        def change() -> None:
+            for actor in actors:
+                actor.paused = on
+
+        self._cast.ask(change)
+        return {"actors": [actor.config.name for actor in actors], "paused": on}
+
+
+def placement(offset: Array) -> dict[str, list[float]]:
+    """Where something sits on its body, as a rig file says it."""
+    return {"position": offset[:3].tolist(), "rotation": offset[3:].tolist()}
+
+
+def _prop(prop: Prop) -> dict[str, Any]:
+    return {"object": prop.object, "scale": prop.scale}

@@ -1,0 +1,259 @@
+"""Bodies straight from OptiTrack Motive: connects, learns version and names, keeps the stream and the clock alive."""
+
+import logging
+import socket
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from manipnet.inputs.base import Intake, Sink
+from manipnet.inputs.natnet.frames import MocapFrame, RigidBody, read_body_names, read_frame
+from manipnet.inputs.natnet.protocol import (
+    COMMAND_PORT,
+    MULTICAST_GROUP,
+    MessageId,
+    ServerInfo,
+    check_version,
+    connect_payload,
+    read_echo,
+    read_packet,
+    read_server_info,
+    write_packet,
+)
+from manipnet.net.addresses import AllowList, Network
+from manipnet.net.clock_offset import ClockProbes
+from manipnet.net.errors import ListenError
+from manipnet.net.rate_limit import SourceGuard
+from manipnet.net.udp import Address, UdpThread, bind_udp, join_multicast, local_address_towards
+from manipnet.telemetry import Counters
+from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, make_sample
+
+KNOCK_S = 1.0
+KEEP_ALIVE_S = 1.0
+ECHO_S = 1.0
+SILENT_S = 3.0
+"""Without a packet for this long the server is believed gone, and is asked to connect again."""
+CHORES_S = 0.1
+
+STATES = ("connecting", "connected", "streaming", "silent")
+UpAxis = Literal["y", "z"]
+_STREAMS_MULTICAST = (
+    "the server streams multicast: start with --multicast, or choose Unicast as Transmission Type in Motive's "
+    "streaming settings"
+)
+_log = logging.getLogger(__name__)
+
+
+class NatNetBodies:
+    """A NatNet client of the server at `host:port`, unicast or multicast.
+
+    `interface` is the address of the network card that faces the server (default: the one the system would
+    send through), `up` the axis that Motive streams as up, which no packet tells. Datagrams from other hosts are
+    refused, except frames from the networks in `allow` (a Motive with two network cards).
+    """
+
+    def __init__(
+        self,
+        sink: Sink,
+        counters: Counters,
+        host: str,
+        port: int = COMMAND_PORT,
+        *,
+        multicast: bool = False,
+        interface: str | None = None,
+        up: UpAxis = "y",
+        allow: Sequence[Network] = (),
+    ) -> None:
+        self._intake = Intake("natnet", sink, counters)
+        self._guard, self._allowed = SourceGuard(), AllowList(allow)
+        self._host, self._port = host, port
+        self._multicast, self._interface, self._up = multicast, interface, up
+        self._server: Address = (host, port)
+        self._command: UdpThread | None = None
+        self._data: UdpThread | None = None
+        self._info: ServerInfo | None = None
+        self._names: Mapping[int, str] = {}
+        self._names_wanted = True
+        self._clock = ClockProbes()
+        self._stamps_ahead_s: float | None = None
+        self._heard_s = self._framed_s = float("-inf")
+        self._done_s: dict[str, float] = {}
+        self._echo_stamp = 0
+        self._problem: str | None = None
+        self.address = f"natnet://{host}:{port}"
+
+    def start(self) -> None:
+        """Open the command socket and begin to knock; raises `ListenError` for a wrong host or interface."""
+        try:
+            resolved = socket.getaddrinfo(self._host, self._port, socket.AF_INET, socket.SOCK_DGRAM)
+        except (OSError, UnicodeError) as error:
+            raise ListenError(
+                f"cannot find the NatNet server {self._host!r}: {error}; name the address of Motive's machine"
+            ) from None
+        self._server = (str(resolved[0][4][0]), self._port)
+        self._interface = self._interface or local_address_towards(*self._server)
+        command = bind_udp("NatNet answers", self._interface, 0)
+        self._command = UdpThread(command, self._receive, self._do_chores, self._lost)
+        self._command.start()
+
+    def stop(self) -> None:
+        """Leave the server and close the sockets; returns when both are done. Harmless when not started."""
+        if self._command is not None:
+            self._send(MessageId.DISCONNECT)
+            self._command.stop()
+            self._command = None
+        if self._data is not None:
+            self._data.stop()
+            self._data = None
+
+    def status(self) -> dict[str, Any]:
+        """What a person needs to know: state, server, names of the bodies, what is wrong; and two offsets from our
+        clock: `clock_offset_s` of the server's, `capture_offset_s` of the frames' times (at the exposure).
+        """
+        now_s = time.monotonic()
+        info, offset, ahead_s = self._info, self._clock.best(now_s), self._stamps_ahead_s
+        return {
+            "state": self._state(now_s),
+            "server": None if info is None else f"{info.application}, NatNet {info.version[0]}.{info.version[1]}",
+            "bodies": {str(id): name for id, name in self._names.items()},
+            "clock_offset_s": None if offset is None else offset.offset_s,
+            "clock_uncertainty_s": None if offset is None else offset.uncertainty_s,
+            "capture_offset_s": None if offset is None or ahead_s is None else offset.offset_s + ahead_s,
+            "problem": self._problem,
+        }
+
+    def _state(self, now_s: float) -> str:
+        if self._info is None:
+            return "connecting"
+        if now_s - self._heard_s > SILENT_S:
+            return "silent"
+        return "streaming" if now_s - self._framed_s <= SILENT_S else "connected"
+
+    # Chores of the command thread
+
+    def _do_chores(self, now_s: float) -> float:
+        # A server that was started anew answers echoes but has forgotten its unicast clients: without frames, knock.
+        if now_s - self._framed_s > SILENT_S and self._is_due("knock", now_s, KNOCK_S):
+            self._send(MessageId.CONNECT, connect_payload("ManipNet Live"))
+        if self._info is None:
+            return CHORES_S
+        if self._names_wanted and self._is_due("names", now_s, KNOCK_S):
+            self._send(MessageId.MODEL_REQUEST)
+        if not self._multicast and self._is_due("keep alive", now_s, KEEP_ALIVE_S):
+            self._send(MessageId.KEEP_ALIVE)
+        if self._is_due("echo", now_s, ECHO_S):
+            self._echo_stamp = time.monotonic_ns()
+            self._send(MessageId.ECHO_REQUEST, self._echo_stamp.to_bytes(8, "little"))
+        return CHORES_S
+
+    def _is_due(self, chore: str, now_s: float, period_s: float) -> bool:
+        if now_s - self._done_s.get(chore, float("-inf")) < period_s:
+            return False
+        self._done_s[chore] = now_s
+        return True
+
+    def _send(self, message_id: MessageId, payload: bytes = b"") -> None:
+        if self._command is None:
+            return
+        try:
+            self._command.socket.sendto(write_packet(message_id, payload), self._server)
+        except OSError as error:
+            self._report(f"cannot send to {self._server[0]}: {error}; is this machine on the server's network?")
+
+    # Packets
+
+    def _receive(self, packet: bytes, sender: Address, now_s: float) -> None:
+        source = f"natnet:{sender[0]}:{sender[1]}"
+        if not self._guard.admits(sender, now_s):
+            self._intake.drop("rate", "natnet", "more packets than can be read from senders unknown so far")
+            return
+        from_server = sender[0] == self._server[0]
+        if not (from_server or self._allowed(sender[0])):
+            self._guard.bad(sender)
+            self._intake.drop("not_allowed", source, f"the NatNet server is {self._server[0]}")
+            return
+        try:
+            message_id, payload = read_packet(packet)
+            if from_server or message_id == MessageId.FRAME:
+                self._take(message_id, payload, source, now_s)
+        except MessageError as error:
+            self._guard.bad(sender)
+            self._intake.drop("malformed", source, error)
+            return
+        self._guard.good(sender)
+        self._heard_s = now_s
+
+    def _take(self, message_id: int, payload: bytes, source: str, now_s: float) -> None:
+        match message_id:
+            case MessageId.FRAME:
+                self._take_frame(payload, source, now_s)
+            case MessageId.SERVER_INFO:
+                self._take_server_info(read_server_info(payload), now_s)
+            case MessageId.MODEL_DEFINITIONS if self._info is not None:
+                self._names = read_body_names(payload, self._info.version)
+                self._names_wanted = False
+            case MessageId.ECHO_RESPONSE if self._info is not None:
+                stamp, ticks = read_echo(payload)
+                if stamp == self._echo_stamp and self._info.clock_hz:
+                    self._clock.add(stamp * 1e-9, ticks / self._info.clock_hz, now_s)
+            case MessageId.DISCONNECT:
+                self._info = None
+
+    def _take_server_info(self, info: ServerInfo, now_s: float) -> None:
+        try:
+            check_version(info.version)
+        except MessageError as error:
+            self._info = None
+            self._intake.drop("unsupported", "natnet", error)
+            self._report(str(error))
+            return
+        if info != self._info or now_s - self._heard_s > SILENT_S:
+            self._clock.clear()
+            self._stamps_ahead_s = None
+        self._info, self._names_wanted = info, True
+        self._report(self._listen_to(info))
+
+    def _listen_to(self, info: ServerInfo) -> str | None:
+        """Join the server's multicast group where that was asked for; says why its frames will not come, or None."""
+        if not self._multicast:
+            return None if info.multicast_group is None else _STREAMS_MULTICAST
+        if self._data is None:
+            group = info.multicast_group or MULTICAST_GROUP
+            try:
+                data = join_multicast(group, info.data_port, self._interface or "0.0.0.0")
+            except ListenError as error:
+                return str(error)
+            self._data = UdpThread(data, self._receive, lambda now_s: CHORES_S, self._lost)
+            self._data.start()
+        return None
+
+    def _take_frame(self, payload: bytes, source: str, now_s: float) -> None:
+        if self._info is None:
+            self._intake.drop("unsupported", source, "a frame before the server told its version")
+            return
+        frame = read_frame(payload, self._info.version)
+        if frame.exposed_ticks and self._info.clock_hz:
+            self._stamps_ahead_s = frame.timestamp_s - frame.exposed_ticks / self._info.clock_hz
+        self._names_wanted = self._names_wanted or frame.models_changed
+        self._framed_s = now_s
+        self._problem = None
+        self._intake.accept(self._body_frame(frame, source, now_s))
+
+    def _body_frame(self, frame: MocapFrame, source: str, now_s: float) -> BodyFrame:
+        bodies = {body.id: self._sample(body) for body in frame.bodies}
+        return BodyFrame(frame.timestamp_s, frame.number, tuple(bodies.values()), now_s, source)
+
+    def _sample(self, body: RigidBody) -> BodySample:
+        (x, y, z), (qx, qy, qz, qw) = body.p, body.q
+        if self._up == "z":  # turn by -90 degrees about x: z becomes y, y becomes -z
+            (x, y, z), (qx, qy, qz) = (x, z, -y), (qx, qz, -qy)
+        return make_sample(body.id, self._names.get(body.id), (x, y, z), (qx, qy, qz, qw), body.tracked)
+
+    def _report(self, problem: str | None) -> None:
+        """Say once what is wrong. One assignment: whoever asks for the status never sees a problem flicker."""
+        before, self._problem = self._problem, problem
+        if problem is not None and problem != before:
+            _log.warning("NatNet: %s", problem)
+
+    def _lost(self, count: int) -> None:
+        self._intake.drop("kernel", "natnet", "the socket's buffer was full", count)

@@ -1,0 +1,76 @@
+"""Who sends bodies: how often, since when no more, and how far the clock behind the frames' times is from ours.
+
+What comes in one direction only tells a clock's offset but for the way: the frame that was fastest counts. How fast it
+was nobody knows, so such an offset has no uncertainty; a ping exchange's has.
+"""
+
+import threading
+from dataclasses import dataclass
+
+from manipnet.inputs.base import Sink
+from manipnet.wire.bodies import BodyFrame
+
+MOST = 64
+RATE_S = 1.0
+CLOCK_S = 10.0
+"""The fastest frame of the last one to two of these counts: clocks drift."""
+RESTART_S = 1.0
+"""No way varies by more than this: the sender's clock was set, or began anew."""
+
+
+@dataclass(slots=True)
+class _Sender:
+    frames: int
+    heard_s: float
+    rated_s: float
+    counted: int
+    rate_hz: float
+    clocked_s: float
+    offset_s: float
+    offset_before_s: float
+
+
+class Senders:
+    """Notes every frame on its way to `sink`. From any thread."""
+
+    def __init__(self, sink: Sink) -> None:
+        self._sink = sink
+        self._lock = threading.Lock()
+        self._senders: dict[str, _Sender] = {}
+
+    def __call__(self, frame: BodyFrame) -> None:
+        with self._lock:
+            self._note(frame, frame.t_received_s, frame.t_s - frame.t_received_s)
+        self._sink(frame)
+
+    def report(self, now_s: float) -> dict[str, dict[str, float | int | None]]:
+        """By source: frames so far, frames a second, age of the newest, offset of its clock from ours."""
+        with self._lock:
+            return {
+                source: {
+                    "frames": sender.frames,
+                    "rate_hz": sender.rate_hz if now_s - sender.heard_s < 2.0 * RATE_S else 0.0,
+                    "age_s": max(now_s - sender.heard_s, 0.0),
+                    "clock_offset_s": max(sender.offset_s, sender.offset_before_s),
+                    "clock_uncertainty_s": None,
+                }
+                for source, sender in self._senders.items()
+            }
+
+    def _note(self, frame: BodyFrame, now_s: float, offset_s: float) -> None:
+        sender = self._senders.pop(frame.source, None)
+        if sender is None or abs(offset_s - sender.offset_s) > RESTART_S:
+            frames = 0 if sender is None else sender.frames
+            sender = _Sender(frames, now_s, now_s, 0, 0.0, now_s, offset_s, offset_s)
+        if len(self._senders) >= MOST:
+            del self._senders[next(iter(self._senders))]  # the one not heard for longest
+        self._senders[frame.source] = sender
+        sender.frames += 1
+        sender.heard_s = now_s
+        sender.counted += 1
+        if now_s - sender.rated_s >= RATE_S:
+            sender.rate_hz = (sender.counted - 1) / (now_s - sender.rated_s)
+            sender.rated_s, sender.counted = now_s, 1
+        if now_s - sender.clocked_s >= CLOCK_S:
+            sender.clocked_s, sender.offset_before_s, sender.offset_s = now_s, sender.offset_s, offset_s
+        sender.offset_s = max(sender.offset_s, offset_s)

@@ -1,0 +1,165 @@
+"""A bound UDP socket with a thread of its own: what OSC and NatNet have in common."""
+
+import contextlib
+import logging
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+from manipnet.net.errors import ListenError
+
+Address = tuple[str, int]
+Receive = Callable[[bytes, Address, float], None]
+"""A datagram, where it came from, and when it was read (`time.monotonic`)."""
+Idle = Callable[[float], float]
+"""Called after every datagram and when none came: does what is due, says in how many seconds again."""
+
+RECEIVE_BUFFER_BYTES = 4 << 20
+DROPS_PERIOD_S = 0.2
+_SO_MEMINFO, _MEMINFO_WORDS, _MEMINFO_DROPS = 55, 9, 8
+_log = logging.getLogger(__name__)
+
+
+class UdpThread:
+    """Reads datagrams of one socket and hands them to `receive` until it is stopped.
+
+    A blocking receive with a timeout in the kernel costs one call a datagram and needs no second descriptor
+    to be woken by. `lost` is called with the number of datagrams the kernel dropped (Linux only).
+    """
+
+    def __init__(self, udp: socket.socket, receive: Receive, idle: Idle, lost: Callable[[int], None]) -> None:
+        self.socket = udp
+        self._receive, self._idle, self._lost = receive, idle, lost
+        self._stopping = threading.Event()
+        self._timeout_s = 0.0
+        self._drops = 0
+        self._thread = threading.Thread(target=self._run, name=f"udp-{udp.getsockname()[1]}", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop the thread and close the socket; returns within the longest idle time."""
+        self._stopping.set()
+        self._thread.join()
+        self.socket.close()
+
+    def _run(self) -> None:
+        buffer = bytearray(65_536)
+        view = memoryview(buffer)
+        look_s = time.monotonic()
+        self._set_timeout(self._idle(look_s))
+        while not self._stopping.is_set():
+            try:
+                size, source = self.socket.recvfrom_into(buffer)
+                now_s = time.monotonic()
+                self._receive(bytes(view[:size]), source[:2], now_s)
+            except (BlockingIOError, TimeoutError, ConnectionResetError):
+                now_s = time.monotonic()  # nothing came, or (Windows) an earlier reply was refused
+            except OSError as error:
+                now_s = time.monotonic()
+                if not self._stopping.is_set():
+                    _log.warning("UDP receive failed: %s", error)
+            except Exception:  # the thread outlives a bug in what it calls
+                now_s = time.monotonic()
+                _log.exception("a datagram was not digested")
+            self._set_timeout(self._idle(now_s))
+            if now_s - look_s > DROPS_PERIOD_S:
+                look_s = now_s
+                self._count_drops()
+
+    def _set_timeout(self, seconds: float) -> None:
+        seconds = min(max(seconds, 0.001), 0.25)
+        if seconds == self._timeout_s:
+            return
+        self._timeout_s = seconds
+        milliseconds = int(seconds * 1_000)
+        if sys.platform == "win32":
+            value = struct.pack("@i", milliseconds)
+        else:
+            value = struct.pack("@ll", milliseconds // 1_000, milliseconds % 1_000 * 1_000)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, value)
+
+    def _count_drops(self) -> None:
+        drops = kernel_drops(self.socket)
+        if drops > self._drops:
+            self._lost(drops - self._drops)
+            self._drops = drops
+
+
+def bind_udp(what: str, host: str, port: int) -> socket.socket:
+    """A UDP socket on `host:port` (0: a free one) with a large receive buffer; raises `ListenError`."""
+    udp: socket.socket | None = None
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        udp = _socket(family)
+        udp.bind(address)
+    except (OSError, UnicodeError) as error:
+        if udp is not None:
+            udp.close()
+        raise ListenError(
+            f"cannot listen for {what} on {host}:{port}: {_reason(error)}; "
+            "choose a free port (0 takes any) and an address of this machine"
+        ) from None
+    return udp
+
+
+def join_multicast(group: str, port: int, interface: str) -> socket.socket:
+    """A UDP socket that hears `group:port` through the network card with the address `interface`, and nothing else.
+
+    Other programs on this machine may hear the same group. Raises `ListenError`.
+    """
+    udp = _socket(socket.AF_INET)
+    try:
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if sys.platform == "darwin":
+            udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        udp.bind(("" if sys.platform == "win32" else group, port))  # Windows binds to no group
+        membership = socket.inet_aton(group) + socket.inet_aton(interface)
+        udp.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+    except OSError as error:
+        udp.close()
+        raise ListenError(
+            f"cannot join multicast {group}:{port} on interface {interface}: {_reason(error)}; "
+            "name the address of the network card that faces the server"
+        ) from None
+    return udp
+
+
+def local_address_towards(host: str, port: int) -> str:
+    """The address of the network card the system would use to reach `host`; raises `ListenError`."""
+    try:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            udp.connect((host, port))  # sends nothing
+            return udp.getsockname()[0]
+    except OSError as error:
+        raise ListenError(
+            f"no network card of this machine reaches {host}: {_reason(error)}; name its address as the interface"
+        ) from None
+
+
+def _socket(family: int) -> socket.socket:
+    udp = socket.socket(family, socket.SOCK_DGRAM)
+    with contextlib.suppress(OSError):  # the system may allow less
+        udp.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+    return udp
+
+
+def _reason(error: Exception) -> str:
+    number = error.errno if isinstance(error, OSError) else None
+    return os.strerror(number) if number is not None and number > 0 else str(error)
+
+
+def kernel_drops(udp: socket.socket) -> int:
+    """Datagrams the kernel threw away because the socket's buffer was full; 0 where it does not tell."""
+    if sys.platform != "linux":
+        return 0
+    try:
+        info = udp.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, 4 * _MEMINFO_WORDS)
+    except OSError:
+        return 0
+    return struct.unpack_from("=I", info, 4 * _MEMINFO_DROPS)[0]

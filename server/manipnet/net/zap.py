@@ -1,0 +1,63 @@
+"""Who may connect over ZeroMQ: CURVE encryption, and an allow-list that is asked at every handshake (ZAP).
+
+CURVE alone lets anybody in who knows the server's public key; the list does not.
+"""
+
+import logging
+
+import zmq
+from zmq.utils import z85
+
+from manipnet.net.curve_keys import ClientKeys, KeyFileError, ServerKeys, read_allow_list
+
+ZAP_ADDRESS = "inproc://zeromq.zap.01"  # fixed by ZeroMQ's RFC 27
+_DOMAIN = b"manipnet"
+_log = logging.getLogger(__name__)
+
+
+class ClientList:
+    """The clients on the list of `keys`, as it is at every handshake."""
+
+    def __init__(self, keys: ServerKeys) -> None:
+        """Raises `KeyFileError` for a list that cannot be read."""
+        read_allow_list(keys.allow_file)
+        self._file = keys.allow_file
+        self._listed: dict[str, str] = {}
+        self._stamp: tuple[int, int] | None = None
+
+    def answer(self, request: list[bytes]) -> tuple[list[bytes], bool]:
+        """The reply of RFC 27, `[version, request id, status, text, user id, metadata]`, and whether it lets in."""
+        version, request_id, domain, _, _, mechanism, *credentials = request
+        name = None
+        if domain == _DOMAIN and mechanism == b"CURVE" and len(credentials) == 1:
+            name = self._names().get(z85.encode(credentials[0]).decode("ascii"))
+        if name is None:
+            return [version, request_id, b"400", b"not on the list", b"", b""], False
+        return [version, request_id, b"200", b"OK", name.encode("ascii"), b""], True
+
+    def _names(self) -> dict[str, str]:
+        """The list as it is now; an unreadable one lets nobody in."""
+        try:
+            status = self._file.stat()
+            stamp = (status.st_mtime_ns, status.st_size)
+            if stamp != self._stamp:
+                self._listed, self._stamp = read_allow_list(self._file), stamp
+        except (OSError, KeyFileError) as error:
+            self._listed, self._stamp = {}, None
+            _log.error("nobody can connect: %s", error)
+        return self._listed
+
+
+def secure_server(socket: zmq.Socket, keys: ServerKeys) -> None:
+    """Give a server's socket its keys. Call before it is bound."""
+    socket.setsockopt(zmq.CURVE_SERVER, 1)
+    socket.setsockopt_string(zmq.CURVE_PUBLICKEY, keys.pair.public)
+    socket.setsockopt_string(zmq.CURVE_SECRETKEY, keys.pair.secret)
+    socket.setsockopt(zmq.ZAP_DOMAIN, _DOMAIN)
+
+
+def secure_client(socket: zmq.Socket, keys: ClientKeys) -> None:
+    """Give a client's socket its keys. Call before it connects."""
+    socket.setsockopt_string(zmq.CURVE_PUBLICKEY, keys.pair.public)
+    socket.setsockopt_string(zmq.CURVE_SECRETKEY, keys.pair.secret)
+    socket.setsockopt_string(zmq.CURVE_SERVERKEY, keys.server_public)

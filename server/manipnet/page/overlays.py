@@ -1,0 +1,186 @@
+"""What can be laid over a hand: its sensors, its contacts, where inverse kinematics aims, and where it is going."""
+
+from typing import Final
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from manipnet.geometry import Array
+from manipnet.page.frames import Frame, PropView, ShapeView
+from manipnet.page.hand_models import HandModel, wxyz
+from manipnet.page.prop_models import PropModels
+from manipnet.page.sensor_snapshot import CELL_CENTERS, Senser, Senses
+from manipnet.synthesis.sensing.ambient import CELL_M
+from manipnet.synthesis.sensing.proximity import SENSOR_COUNT
+from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
+from manipnet.wire import Side
+
+LAYERS: Final = {
+    "ambient": "Ambient sensor",
+    "proximity": "Proximity",
+    "contacts": "Contacts",
+    "targets": "IK targets",
+    "ghost": "Ghost ahead",
+}
+"""Names of the layers, and what people call them."""
+SENSED: Final = ("ambient", "proximity", "contacts", "targets")
+CONTACT_M: Final = 0.004
+"""A sensor nearer than this touches."""
+
+NEAR, FAR = np.array([255.0, 92.0, 60.0]), np.array([70.0, 140.0, 255.0])
+AMBIENT_COLOR: Final = (255, 190, 80)
+TOUCH_COLOR: Final = (255, 72, 40)
+TARGET_COLOR: Final = (80, 255, 160)
+OCCUPIED: Final = 0.3
+"""Share of a cell inside the object from which it is shown."""
+RAW_COLOR: Final = (255, 255, 255)
+PATH_COLOR: Final = (140, 190, 255)
+
+
+class HandLayers:
+    """The sensors, contacts and targets of one hand, under `name`.
+
+    They hang on its wrist: browsers move what hangs together at once, and take in new points when they find the time.
+    """
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._wrist = scene.add_frame(name, show_axes=False)
+        self._ambient = _points(scene, f"{name}/ambient", len(CELL_CENTERS), 0.35 * CELL_M, AMBIENT_COLOR)
+        self._rays = scene.add_line_segments(
+            f"{name}/rays",
+            np.zeros((SENSOR_COUNT, 2, 3)),
+            np.zeros((SENSOR_COUNT, 2, 3), np.uint8),
+            thickness=1.5,
+            thickness_units="screen",
+        )
+        self._points = _points(scene, f"{name}/sensors", SENSOR_COUNT, 0.0035)
+        self._touches = _points(scene, f"{name}/contacts", SENSOR_COUNT, 0.009, TOUCH_COLOR)
+        self._raw = _points(scene, f"{name}/raw", 22, 0.004, RAW_COLOR)
+        self._targets = _points(scene, f"{name}/targets", 22, 0.007, TARGET_COLOR)
+        self._aims = scene.add_line_segments(
+            f"{name}/aims", np.zeros((22, 2, 3)), TARGET_COLOR, thickness=2.0, thickness_units="screen"
+        )
+
+    def show(self, senses: Senses | None, shown: set[str]) -> None:
+        """The layers in `shown`; none without senses."""
+        shown = shown if senses is not None else set()
+        self._ambient.visible = "ambient" in shown
+        self._rays.visible = self._points.visible = "proximity" in shown
+        self._touches.visible = "contacts" in shown
+        self._raw.visible = self._targets.visible = self._aims.visible = "targets" in shown
+        if senses is None:
+            return
+        self._wrist.position, self._wrist.wxyz = senses.wrist[:3], wxyz(senses.wrist[3:])
+        if "ambient" in shown:
+            self._show_ambient(senses)
+        if "proximity" in shown:
+            self._show_proximity(senses)
+        if "contacts" in shown:
+            # what does not touch hides inside the first point that does, so the number of points never changes
+            near = np.abs(senses.readings) < CONTACT_M
+            self._touches.visible = bool(near.any())
+            if near.any():
+                self._touches.points = _f32(np.where(near[:, None], senses.points, senses.points[near][0]))
+        if "targets" in shown:
+            self._raw.points, self._targets.points = _f32(senses.raw), _f32(senses.targets)
+            self._aims.points = _f32(np.stack([senses.raw, senses.targets], axis=1))
+
+    def _show_ambient(self, senses: Senses) -> None:
+        full = senses.ambient > OCCUPIED
+        self._ambient.visible = bool(full.any())
+        if full.any():
+            self._ambient.points = _f32(np.where(full[:, None], senses.cells, senses.cells[full][0]))
+
+    def _show_proximity(self, senses: Senses) -> None:
+        nearness = 1.0 - np.clip(np.abs(senses.readings) / SENSOR_RANGE_M, 0.0, 1.0)[:, None]
+        colors = np.round(FAR + nearness * (NEAR - FAR)).astype(np.uint8)
+        hit = (senses.readings < SENSOR_RANGE_M)[:, None]
+        ends = senses.points + np.where(hit, senses.readings[:, None], 0.0) * senses.normals
+        self._points.points, self._points.colors = _f32(senses.points), colors
+        self._rays.points = _f32(np.stack([senses.points, ends], axis=1))
+        self._rays.colors = np.repeat(colors[:, None], 2, axis=1)
+
+
+class Ghost:
+    """Where wrists and props of one actor will be at the end of the window, and the way there."""
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._scene, self._name = scene, name
+        self._hands: dict[Side, HandModel] = {}
+        self._props = PropModels(scene, f"{name}/props", ghost=True)
+        self._paths: dict[str, viser.LineSegmentsHandle] = {}
+
+    def show(self, frame: Frame, shapes: dict[str, ShapeView], visible: bool) -> None:
+        """As of one tick."""
+        message = frame.message
+        ends = {name: window[-1] for name, window in frame.windows.items()}
+        self._props.show(frame.props, shapes, ends, visible)
+        for side, hand in message.hands.items():
+            end = ends.get(f"{side}_wrist")
+            if visible and end is not None:
+                if side not in self._hands or self._hands[side].scale != hand.scale:
+                    self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", side, hand.scale, ghost=True)
+                self._hands[side].pose(hand, end)
+        for side, model in self._hands.items():
+            model.show(visible and side in message.hands and f"{side}_wrist" in ends)
+        for name, window in frame.windows.items():
+            if visible or name in self._paths:
+                self._path(name, window).visible = visible
+
+    def _path(self, name: str, window: Array) -> viser.LineSegmentsHandle:
+        future = window[len(window) // 2 :, :3]
+        segments = _f32(np.stack([future[:-1], future[1:]], axis=1))
+        if name not in self._paths:
+            self._paths[name] = self._scene.add_line_segments(
+                f"{self._name}/path/{name}", segments, PATH_COLOR, thickness=2.0, thickness_units="screen"
+            )
+        self._paths[name].points = segments
+        return self._paths[name]
+
+
+class ActorLayers:
+    """All layers of one actor, under `name`."""
+
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._scene, self._name, self._senser = scene, name, Senser()
+        self._hands: dict[Side, HandLayers] = {}
+        self._ghost = Ghost(scene, f"{name}/ghost")
+
+    def show(self, frame: Frame, shapes: dict[str, ShapeView], shown: set[str]) -> None:
+        """The layers in `shown`, of one tick."""
+        self._ghost.show(frame, shapes, "ghost" in shown)
+        props = {prop.name: prop for prop in frame.props}
+        for side in ("left", "right"):
+            senses = self._senses(frame, side, props, shapes) if shown & set(SENSED) else None
+            if senses is not None and side not in self._hands:
+                self._hands[side] = HandLayers(self._scene, f"{self._name}/{side}")
+            if side in self._hands:
+                self._hands[side].show(senses, shown)
+
+    def _senses(
+        self, frame: Frame, side: Side, props: dict[str, PropView], shapes: dict[str, ShapeView]
+    ) -> Senses | None:
+        hand = frame.hands.get(side)
+        prop = None if hand is None else props.get(hand.prop)
+        if prop is None or prop.content_hash not in shapes or side not in frame.message.hands:
+            return None
+        return self._senser.sense(frame, side, shapes[prop.content_hash], prop.scale)
+
+
+def _f32(values: np.ndarray) -> NDArray[np.float32]:
+    return values.astype(np.float32)
+
+
+def _points(
+    scene: viser.SceneApi, name: str, count: int, size_m: float, color: tuple[int, int, int] = (255, 255, 255)
+) -> viser.PointCloudHandle:
+    return scene.add_point_cloud(
+        name,
+        np.zeros((count, 3)),
+        color,
+        point_size=size_m,
+        point_shape="circle",
+        point_shading="flat",
+        precision="float32",
+    )

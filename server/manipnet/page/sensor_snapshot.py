@@ -1,0 +1,96 @@
+"""What a hand senses and aimed for at a tick, computed for the eye: in the page's process, by the network's kernels.
+
+The sensors are those of the hand as it is shown. The network's own were on the pose it went on from, a tick before and
+without its grip: they would be up to a centimetre beside the fingers.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from manipnet.geometry import Array, mirror_points, mirror_poses
+from manipnet.page.frames import Frame, ShapeView
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.ik.snapshot import present_senses
+from manipnet.synthesis.objects.mesh import ClosedMesh
+from manipnet.synthesis.objects.shape import Shape, build_shape
+from manipnet.synthesis.sensing.ambient import CELL_M, CELLS, CENTER_M
+from manipnet.wire import Side
+
+_STEPS: Final = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
+CELL_CENTERS: Final = CENTER_M + np.stack(np.meshgrid(_STEPS, _STEPS, _STEPS, indexing="ij"), axis=-1).reshape(-1, 3)
+"""`(1000, 3)` in the wrist frame of a right hand, in the order of the sensor."""
+
+
+@dataclass(frozen=True, eq=False)
+class Senses:
+    """One hand's, in the frame of its `wrist (7,)`: occupancy `ambient (1000,)` of `cells (1000, 3)`; sensor `points`,
+    `normals (104, 3)` and `readings (104,)` in metres; joints before `raw (22, 3)` and `targets (22, 3)` of inverse
+    kinematics."""
+
+    wrist: Array
+    cells: Array
+    ambient: np.ndarray
+    points: Array
+    normals: Array
+    readings: Array
+    raw: Array
+    targets: Array
+
+
+class Senser:
+    """Senses with shapes, each of which is built, or read from the cache, once."""
+
+    def __init__(self) -> None:
+        self._shapes: dict[str, Shape] = {}
+
+    def sense(self, frame: Frame, side: Side, view: ShapeView, prop_scale: float) -> Senses:
+        """What the hand of one side senses of the shape it is about."""
+        hand, shown = frame.hands[side], frame.message.hands[side]
+        size, positions, rotations = shown.scale, *forward_kinematics(np.asarray(shown.angles, np.float64))
+        wrist, obj = (_shrunk(pose, size) for pose in (shown.wrist, _present(frame, hand.prop)))
+        mirrored = side == "left"
+        if mirrored:
+            wrist, obj = mirror_poses(wrist), mirror_poses(obj)
+        local = present_senses(
+            self._shape(view),
+            wrist,
+            obj,
+            mirrored,
+            prop_scale / size,
+            positions,
+            rotations,
+            hand.raw_positions,
+            hand.distances,
+        )
+
+        def real(points: Array) -> Array:
+            return size * (mirror_points(points) if mirrored else points)
+
+        return Senses(
+            _shrunk(shown.wrist, 1.0),
+            real(CELL_CENTERS),
+            local.ambient,
+            real(local.points),
+            real(local.normals) / size,
+            local.readings * size,
+            real(hand.raw_positions),
+            real(local.targets),
+        )
+
+    def _shape(self, view: ShapeView) -> Shape:
+        if view.content_hash not in self._shapes:
+            mesh = ClosedMesh(view.name, view.vertices, view.faces, view.content_hash)
+            self._shapes[view.content_hash] = build_shape(mesh)
+        return self._shapes[view.content_hash]
+
+
+def _present(frame: Frame, name: str) -> Array:
+    """Where a body is at the tick."""
+    return frame.windows[name][len(frame.windows[name]) // 2]
+
+
+def _shrunk(pose: Array, size: float) -> Array:
+    """A pose as a hand of the model's size would see it."""
+    return np.concatenate([np.asarray(pose[:3], np.float64) / size, pose[3:]])

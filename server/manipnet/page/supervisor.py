@@ -1,0 +1,206 @@
+"""The live page as its server sees it: an address, and a process of its own from the first visit on.
+
+Nothing of the page runs in the server: it costs a socket until a browser comes, and then what one thread needs to hand
+over the newest tick. The process ends with the server, however that ends; when the process ends, the next visit or the
+browser's own reconnecting starts another.
+"""
+
+import contextlib
+import logging
+import multiprocessing
+import selectors
+import socket
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from multiprocessing.connection import Connection
+from typing import Any, Final
+
+from manipnet.actors.actor import Actor, Plan
+from manipnet.actors.props import Prop
+from manipnet.geometry import Array
+from manipnet.net.errors import ListenError
+from manipnet.page.frames import Frame, HandView, PropView, ShapeView
+from manipnet.page.serialization import pack, unpack
+from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.synthesizer import HandStep, Side
+from manipnet.telemetry import Counters
+from manipnet.tracking.timeline import Tick
+from manipnet.wire import HandsMessage
+
+FRAMES_HZ: Final = 30.0
+"""As many ticks a second go to the page; the newest ones."""
+POLL_S: Final = 0.2
+"""A stop is noticed within this."""
+STOP_S: Final = 3.0
+RESTART_S: Final = (0.5, 30.0)
+"""Before a page that ended is started again; longer each time it does not last."""
+LASTED_S: Final = 60.0
+
+_log = logging.getLogger(__name__)
+Answer = Callable[[list[bytes]], bytes]
+
+
+class LivePage:
+    """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
+
+    def __init__(self, host: str, port: int, answer: Answer, counters: Counters) -> None:
+        """Raises `ListenError`. `answer` meets the page's requests, as it does any client's."""
+        self._listener = _listen(host, port)
+        self.address = _url(host, self._listener.getsockname()[1])
+        self._answer, self._counters = answer, counters
+        self.watched = False
+        """Whether a browser is open: only then is there anything to `see`."""
+        self._news, self._telling = threading.Condition(), threading.Lock()
+        self._newest: dict[str, tuple[Frame, Sequence[Shape]]] = {}
+        self._stopping = threading.Event()
+        self._wake, self._woken = socket.socketpair()
+        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
+
+    def start(self) -> None:
+        """Begin to serve."""
+        self._thread.start()
+
+    def see(
+        self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
+    ) -> None:
+        """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
+        frame = frame_of(actor, tick, steps, message)
+        with self._news:
+            if message.actor in self._newest:
+                self._counters.add("page_frames", fate="skipped")
+            self._newest[message.actor] = frame, [prop.shape for prop in actor.props]
+            self._news.notify()
+
+    def stop(self) -> None:
+        """End the page and free the port."""
+        self._stopping.set()
+        self._wake.send(b"x")
+        if self._thread.is_alive():
+            self._thread.join()
+        for each in (self._listener, self._wake, self._woken):
+            each.close()
+
+    def _run(self) -> None:
+        pause_s = RESTART_S[0]
+        while self._visited():
+            begin_s = time.monotonic()
+            try:
+                self._serve()
+            except Exception as error:  # whatever it is, the session goes on without a page
+                _log.error("the page: %s: %s", type(error).__name__, error)
+            if self._stopping.is_set():
+                return
+            self._counters.add("page_ended", reason="crash")
+            _log.error("the page's process has ended; the session goes on, and a visit starts the page again")
+            pause_s = RESTART_S[0] if time.monotonic() - begin_s > LASTED_S else min(2.0 * pause_s, RESTART_S[1])
+            self._stopping.wait(pause_s)
+
+    def _visited(self) -> bool:
+        """Wait for a browser; False when the server stops."""
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._listener, selectors.EVENT_READ)
+            selector.register(self._woken, selectors.EVENT_READ)
+            selector.select()
+        return not self._stopping.is_set()
+
+    def _serve(self) -> None:
+        """One life of the page's process."""
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=_page, args=(self._listener, theirs), name="page", daemon=True)
+        process.start()
+        theirs.close()
+        sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
+        try:
+            sender.start()
+            self._listen_to(ours)
+        finally:
+            self.watched = False
+            ours.close()
+            with self._news:
+                self._newest.clear()
+                self._news.notify()
+            process.join(STOP_S)
+            if process.is_alive():
+                process.kill()
+                process.join()
+            sender.join()
+
+    def _listen_to(self, ours: Connection) -> None:
+        """Until the process or the server ends: who watches, what is asked, what is worth a line in the log."""
+        while not self._stopping.is_set():
+            try:
+                if not ours.poll(POLL_S):
+                    continue
+                what, content = unpack(ours.recv_bytes())
+            except (EOFError, OSError):
+                return
+            if what == "watched":
+                self.watched = content
+            elif what == "ask":
+                number, request = content
+                self._tell(ours, "answer", (number, self._answer([request])))
+            elif what == "log":
+                _log.log(content[0], "%s", content[1])
+
+    def _send(self, ours: Connection) -> None:
+        """Hand over the newest ticks, and each shape before the first tick it is in."""
+        sent: set[str] = set()
+        while not ours.closed:
+            with self._news:
+                if not self._newest:
+                    self._news.wait(1.0)
+                newest, self._newest = list(self._newest.values()), {}
+            begin_s = time.monotonic()
+            for frame, shapes in newest:
+                for shape in shapes:
+                    if shape.content_hash not in sent:
+                        sent.add(shape.content_hash)
+                        mesh = shape.mesh
+                        view = ShapeView(shape.name, shape.content_hash, mesh.vertices, mesh.faces)
+                        self._tell(ours, "shape", view)
+                self._tell(ours, "frame", frame)
+                self._counters.add("page_frames", fate="shown")
+            time.sleep(max(begin_s + 1.0 / FRAMES_HZ - time.monotonic(), 0.0))
+
+    def _tell(self, ours: Connection, what: str, content: Any) -> None:
+        parcel = pack(what, content)
+        with self._telling, contextlib.suppress(OSError, ValueError):  # it has ended; who listens to it notices
+            ours.send_bytes(parcel)
+
+
+def frame_of(actor: Actor, tick: Tick, steps: Mapping[Side, HandStep], message: HandsMessage) -> Frame:
+    """All there is to see of one tick of an actor."""
+    props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
+    windows = {name: body.window for name, body in tick.bodies.items()}
+    hands: dict[Side, HandView] = {}
+    for side, step in steps.items():
+        if (prop := actor.hands[side].prop) is not None:
+            hands[side] = HandView(prop, step.distances, step.raw_positions)
+    return Frame(message, props, windows, hands)
+
+
+def _prop(prop: Prop, offset: Array) -> PropView:
+    return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
+
+
+def _page(listener: socket.socket, connection: Connection) -> None:
+    from manipnet.page.app import serve  # what it needs is of no use to the server itself
+
+    serve(listener, connection)
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        return socket.create_server(address[:2], family=family, backlog=64)
+    except OSError as error:
+        raise ListenError(
+            f"--page-port: cannot listen on {host}:{port}: {error.strerror or error}; "
+            "is another program using it? --page-port 0 takes any free port"
+        ) from None
+
+
+def _url(host: str, port: int) -> str:
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"

@@ -1,0 +1,113 @@
+"""A viser server that only answers whom it should: on a socket that is given, to pages of its own, without a tunnel."""
+
+import asyncio
+import contextlib
+import socket
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
+from http import HTTPStatus
+from importlib.resources import files
+from typing import Any, Final
+from urllib.parse import parse_qs, urlsplit
+
+import viser
+import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from manipnet.config.settings import is_loopback
+from manipnet.outputs.websocket import LOCAL_PAGES
+
+OPERATOR: Final = ContextVar("OPERATOR", default=False)
+"""Whether the connection being served may change anything: a page of this machine, looked at on this machine."""
+SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
+"""What the page adds to viser's own: a title, and files that are dropped on it."""
+DROP_PATH: Final = "/drop"
+_POLICY_VIOLATION: Final = 1008
+
+Dropped = Callable[[str, bytes], str]
+
+
+class Server(viser.ViserServer):
+    """Viser without its public tunnel, which any visitor could open otherwise."""
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """Nothing is shared."""
+        return None
+
+
+def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server:
+    """Serve on a socket that already listens; on loopback only pages of this machine come in.
+
+    `dropped` is given the name and content of a file an operator dropped on the page, and says what became of it.
+    """
+    with _served_on(listener, dropped):
+        return Server(host="127.0.0.1", port=0, label=label, verbose=False)
+
+
+@contextlib.contextmanager
+def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
+    """Viser has neither an option for a socket nor one for origins, so what it calls is stood in for."""
+    original = websockets.asyncio.server.serve
+    exposed = not is_loopback(listener.getsockname()[0])
+
+    def serve(handler: Any, _host: str, _port: int, *, process_request: Any, **options: Any) -> Any:
+        async def handle(connection: ServerConnection) -> None:
+            request = connection.request
+            assert request is not None
+            OPERATOR.set(may_act(connection.remote_address[0], request.headers))
+            if urlsplit(request.path).path == DROP_PATH:
+                await _take_in(connection, request, dropped)
+            else:
+                await handler(connection)
+
+        def answer(connection: ServerConnection, request: Request) -> Response | None:
+            if not may_look(request.headers, exposed):
+                return connection.respond(HTTPStatus.FORBIDDEN, "This page is not for other web sites.\n")
+            with contextlib.suppress(KeyError):  # the script is put into what has not been compressed
+                del request.headers["Accept-Encoding"]
+            response = process_request(connection, request)
+            return _with_script(response) if urlsplit(request.path).path == "/" else response
+
+        return original(handle, sock=listener, process_request=answer, **options)
+
+    websockets.asyncio.server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
+    try:
+        yield
+    finally:
+        websockets.asyncio.server.serve = original  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def may_look(headers: Any, exposed: bool) -> bool:
+    """Whether a request comes from a page of this machine, from no page at all or, where other machines are let in,
+    from the page itself: no other web site open in the same browser may."""
+    origin, host = headers.get("Origin"), headers.get("Host", "")
+    local = LOCAL_PAGES.fullmatch(f"http://{host}") is not None
+    if origin is None:
+        return local or exposed
+    return (local and LOCAL_PAGES.fullmatch(origin) is not None) or (exposed and origin == f"http://{host}")
+
+
+def may_act(address: str, headers: Any) -> bool:
+    """Whether a visitor may change anything: one on this machine, through an address of this machine only."""
+    return is_loopback(address) and may_look(headers, exposed=False)
+
+
+async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
+    """One file: its name in the query, its content the only message."""
+    if not OPERATOR.get():
+        await connection.close(_POLICY_VIOLATION, "only the server's own machine may bring in files")
+        return
+    name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
+    with contextlib.suppress(ConnectionClosed):
+        content = await connection.recv(decode=False)
+        await connection.send(await asyncio.to_thread(dropped, name, content))
+
+
+def _with_script(response: Response | None) -> Response | None:
+    if response is not None and response.status_code == HTTPStatus.OK:
+        response.body = (response.body or b"").replace(b"</body>", f"<script>{SCRIPT}</script></body>".encode(), 1)
+        del response.headers["Content-Length"]
+        response.headers["Content-Length"] = str(len(response.body))
+    return response

@@ -1,0 +1,79 @@
+"""Run everything once before a client waits for it: compiled code, the network's memory, the first allocations."""
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from manipnet.actors.actor import Actor
+from manipnet.actors.props import Prop
+from manipnet.config.settings import default_actor
+from manipnet.runtime.flight_recorder import FlightRecorder
+from manipnet.runtime.mailbox import Mailbox
+from manipnet.runtime.tick_loop import TickLoop
+from manipnet.synthesis.ik.pose import pose_by_least_squares, room_for_poses
+from manipnet.synthesis.model.bundle import Bundle
+from manipnet.synthesis.model.layout import INPUT_SIZE
+from manipnet.synthesis.objects.library import load_library_mesh
+from manipnet.synthesis.objects.shape import Shape, build_shape
+from manipnet.synthesis.synthesizer import HandScene, Synthesizer, windows_of
+from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.wire import encode_binary, encode_msgpack
+from manipnet.wire.bodies import BodyFrame, BodySample
+
+FRAMES = 120
+"""Two hands at a prop for one second: about thirty ticks."""
+
+
+LOOK_AHEAD_S = 0.4
+"""So that there is something to forecast."""
+
+
+def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
+    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
+    for shape in shapes:
+        counters, timings = Counters(), Timings()
+        mailbox = Mailbox(counters)
+        actor = Actor(default_actor(), [Prop("prop", shape.name, shape)], bundle, counters, LOOK_AHEAD_S)
+        actor.carry("prop", shape.name, shape, 1.0)
+        stages = StageClock(timings)
+        loop = TickLoop(
+            "warm-up",
+            [actor],
+            Synthesizer(bundle, on_stage=stages.ended),
+            stages,
+            lambda message: (encode_msgpack(message), encode_binary(message)),
+            mailbox,
+            FlightRecorder(Path(tempfile.gettempdir())),
+            counters,
+            timings,
+        )
+        start_s = time.monotonic()
+        for i in range(FRAMES):
+            t_s = i / FRAMES
+            mailbox.put(_frame(t_s, start_s + t_s))
+            loop.take_in(0.0)
+            while loop.step(start_s + t_s):
+                pass
+
+
+def pose_a_hand(bundle: Bundle) -> None:
+    """Decode and solve: the kernel that this process compiles at a first start, while another compiles the rest."""
+    shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
+    windows = windows_of([HandScene("right", still, still, still, shape)])
+    outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]
+    poses = room_for_poses(1)
+    poses.correction[:] = 0.0
+    pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
+
+
+def _frame(t_s: float, now_s: float) -> BodyFrame:
+    swing = 0.02 * float(np.sin(2.0 * np.pi * t_s))
+    bodies = (
+        BodySample(None, "left_wrist", (0.15, swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),
+        BodySample(None, "right_wrist", (-0.15, -swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),
+        BodySample(None, "prop", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True),
+    )
+    return BodyFrame(t_s, None, bodies, now_s, "zmq:warm-up")

@@ -1,0 +1,33 @@
+"""Where the joints should go: the network's positions corrected by its distances (paper, appendix B, algorithm 1)."""
+
+from manipnet.jit import inner
+from manipnet.synthesis.objects.distance_field import signed_distance
+from manipnet.synthesis.sensing.scene import map_direction_back, map_point
+
+NEAR_M = 0.028
+"""A predicted distance above this leaves the joint where the network put it."""
+
+
+@inner
+def mix_distances(predicted, measured):
+    """Final distance of a joint: trust the prediction when the position is inside the object, else the position."""
+    if measured < 0.0:
+        return 0.8 * predicted + 0.2 * measured
+    return 0.2 * predicted + 0.8 * measured
+
+
+@inner
+def place_targets(solid, rotation, translation, scale, positions, distances, targets):
+    """Targets `(22, 3)` in the wrist frame from predicted joint `positions (22, 3)` and `distances (22,)`, metres."""
+    for j in range(len(positions)):
+        for i in range(3):
+            targets[j, i] = positions[j, i]
+        if distances[j] > NEAR_M:
+            continue
+        x, y, z = map_point(rotation, translation, scale, positions[j, 0], positions[j, 1], positions[j, 2])
+        measured, nx, ny, nz = signed_distance(solid.bvh, solid.field, x, y, z, solid.exact_within_m)
+        nx, ny, nz = map_direction_back(rotation, nx, ny, nz)
+        step = mix_distances(distances[j], measured * scale) - measured * scale
+        targets[j, 0] += step * nx
+        targets[j, 1] += step * ny
+        targets[j, 2] += step * nz

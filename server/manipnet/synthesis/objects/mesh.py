@@ -1,0 +1,152 @@
+"""Object meshes: read in metres, closed and turned outward, or refused with the reason and the remedy."""
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from manipnet.synthesis.objects.repair import (
+    drop_debris,
+    fill_small_holes,
+    is_closed,
+    mesh_edges,
+    orient,
+    signed_volume,
+    weld,
+)
+
+UNITS_M: Final = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+FORMATS: Final = (".obj", ".ply", ".stl", ".glb")
+MAX_FACES: Final = 300_000
+MAX_FILE_BYTES: Final = 200_000_000
+SIZE_RANGE_M: Final = (0.005, 3.0)
+
+
+class MeshError(ValueError):
+    """A mesh that cannot be an object; the text names what is wrong, where, and what to do about it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedMesh:
+    """A watertight triangle mesh in metres: `vertices (V, 3)`, `faces (F, 3)` int32 turned outward.
+
+    `content_hash` identifies the geometry, whatever file it came from.
+    """
+
+    name: str
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    content_hash: str
+
+
+def load_mesh(path: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> ClosedMesh:
+    """Read OBJ, PLY, STL or GLB and close it. `unit` is the file's; `scale` resizes about the origin on top.
+
+    Raises `MeshError`, which starts with the path.
+    """
+    path = Path(path)
+    try:
+        if unit not in UNITS_M:
+            raise MeshError(f"unit {unit!r} is unknown; allowed are {', '.join(UNITS_M)}")
+        if not (np.isfinite(scale) and 1e-3 <= scale <= 1e3):
+            raise MeshError(f"scale {scale} is outside 0.001 to 1000")
+        vertices, faces = _read(path)
+        return closed_mesh(vertices * (UNITS_M[unit] * scale), faces, name or path.stem)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def closed_mesh(vertices: NDArray, faces: NDArray, name: str) -> ClosedMesh:
+    """Check and repair a triangle mesh in metres; raises `MeshError` if it cannot be closed.
+
+    Repairs are those that do not change the shape: vertices at the same place merged, repeated faces and debris
+    dropped, small holes closed, faces turned outward. A mesh that is closed already keeps its arrays.
+    """
+    vertices, faces = np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int32)
+    _check_arrays(vertices, faces)
+    _check_size(vertices[np.unique(faces)])
+    if not is_closed(faces):
+        vertices, faces = weld(vertices, faces)
+    faces = orient(vertices, faces)
+    if not is_closed(faces):
+        vertices, faces = fill_small_holes(vertices, faces)
+        vertices, faces = drop_debris(vertices, orient(vertices, faces))
+    _check_closed(vertices, faces)
+    digest = hashlib.sha256(vertices.astype("<f8").tobytes() + faces.astype("<i4").tobytes()).hexdigest()
+    return ClosedMesh(name, vertices, faces, digest)
+
+
+def _read(path: Path) -> tuple[NDArray, NDArray]:
+    if path.suffix.lower() not in FORMATS:
+        raise MeshError(f"{path.suffix or 'no'} format is unknown; allowed are {', '.join(FORMATS)}")
+    if not path.is_file():
+        raise MeshError("no such file")
+    if path.stat().st_size > MAX_FILE_BYTES:
+        raise MeshError(f"file is over {MAX_FILE_BYTES // 1_000_000} MB; reduce the mesh before loading")
+    try:
+        mesh = trimesh.load_mesh(path, process=False, **({"skip_materials": True} if _is_obj(path) else {}))
+    except Exception as error:  # readers of foreign formats raise whatever they stumble over
+        reason = f"{type(error).__name__}: {error}"
+        raise MeshError(f"cannot be read as {path.suffix[1:].upper()} ({reason}); export it again") from None
+    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
+        raise MeshError("holds no triangles; export the surface, not points, curves or an empty scene")
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+
+
+def _is_obj(path: Path) -> bool:
+    return path.suffix.lower() == ".obj"
+
+
+def _check_arrays(vertices: NDArray, faces: NDArray) -> None:
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
+        raise MeshError(f"needs vertices (V, 3) and faces (F, 3), found {vertices.shape} and {faces.shape}")
+    if not np.isfinite(vertices).all():
+        bad = int(np.argwhere(~np.isfinite(vertices))[0, 0])
+        raise MeshError(f"vertex {bad} is not finite: {vertices[bad]}; export the mesh again")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise MeshError(f"a face names vertex {faces.max()}, allowed are 0 to {len(vertices) - 1}")
+    if len(faces) > MAX_FACES:
+        raise MeshError(
+            f"{len(faces)} triangles, allowed are {MAX_FACES}; decimate it (5,000 show no less of the shape)"
+        )
+
+
+def _check_size(vertices: NDArray) -> None:
+    smallest, largest = SIZE_RANGE_M
+    size = float(np.ptp(vertices, axis=0).max())
+    if smallest <= size <= largest:
+        return
+    hint = next((unit for unit, metre in UNITS_M.items() if 0.03 <= size * metre <= 0.6), None)
+    remedy = f'set unit = "{hint}" if the file is in {hint}' if hint else "set its unit or scale"
+    raise MeshError(f"is {size:.3g} m across, allowed are {smallest} to {largest} m; {remedy}")
+
+
+def _check_closed(vertices: NDArray, faces: NDArray) -> None:
+    if not len(faces):
+        raise MeshError("has no triangle with an area")
+    edges = mesh_edges(faces)
+    open_edges, crowded = edges.ends[edges.uses == 1], edges.ends[edges.uses > 2]
+    if len(open_edges):
+        points = vertices[open_edges.reshape(-1)]
+        raise MeshError(
+            f"is not closed: {len(open_edges)} open edges around {_place(points)}, an opening up to "
+            f"{100 * np.ptp(points, axis=0).max():.1f} cm wide. A sheet has no inside: give it a thickness "
+            "(Blender: Solidify) or close it (Blender: Mesh > Clean Up > Fill Holes)"
+        )
+    if len(crowded):
+        raise MeshError(
+            f"is not a surface: {len(crowded)} edges have more than two faces, around "
+            f"{_place(vertices[crowded.reshape(-1)])}; remove inner walls (Blender: 3D-Print > Make Manifold)"
+        )
+    size = float(np.ptp(vertices, axis=0).max())
+    if signed_volume(vertices, faces) < 1e-5 * size**3:
+        raise MeshError("encloses no volume: it is flat, or inside out in parts; give it a thickness")
+
+
+def _place(points: NDArray) -> str:
+    x, y, z = points.mean(axis=0)
+    return f"({x:.3f}, {y:.3f}, {z:.3f}) m"

@@ -1,0 +1,169 @@
+"""A shape: what the hands sense of an object. Built once from a closed mesh, cached on disk by its content."""
+
+import logging
+import os
+import zipfile
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from platformdirs import user_cache_dir
+from trimesh.triangles import mass_properties
+
+from manipnet.geometry import Array
+from manipnet.jit import kernel
+from manipnet.synthesis.objects.bvh import Bvh, build_bvh
+from manipnet.synthesis.objects.distance_field import (
+    EXACT_WITHIN_CELLS,
+    RESOLUTION,
+    Field,
+    build_field,
+    signed_distance,
+)
+from manipnet.synthesis.objects.mesh import ClosedMesh, load_mesh
+from manipnet.synthesis.objects.rays import RayScene, ray_scene
+from manipnet.synthesis.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES, simplified
+
+_CACHE_VERSION = f"1-{RESOLUTION}"
+PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
+"""Shapes of the demo's objects, so that a first start need not compile what builds them."""
+_log = logging.getLogger(__name__)
+
+
+class Solid(NamedTuple):
+    """What kernels know of a shape."""
+
+    bvh: Bvh
+    field: Field
+    exact_within_m: float
+    """Distance in the object's own metres below which the sensors refine the field exactly."""
+    center_of_mass: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """An object's geometry in its own frame, metres, at scale 1, with the queries the sensors and the solver make."""
+
+    mesh: ClosedMesh
+    bvh: Bvh
+    """Of the mesh, or of a simpler one nearly the same (`simplify`)."""
+    field: Field
+    center_of_mass: Array
+    """`(3,)`, for uniform density."""
+    volume_m3: float
+    inertia: Array
+    """`(3, 3)` about the centre of mass for a total mass of 1 kg."""
+
+    @property
+    def name(self) -> str:
+        """Name of the mesh it was built from."""
+        return self.mesh.name
+
+    @property
+    def content_hash(self) -> str:
+        """Hash of the geometry."""
+        return self.mesh.content_hash
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper corner, `(2, 3)`."""
+        return self.bvh.boxes[0].reshape(2, 3)
+
+    @cached_property
+    def reach_m(self) -> float:
+        """No part of it is farther than this from the origin of its frame, metres at scale 1."""
+        return float(np.linalg.norm(np.abs(self.bounds).max(axis=0)))
+
+    @cached_property
+    def distance_at_origin_m(self) -> float:
+        """Signed distance of the origin of its frame, metres at scale 1."""
+        return self.distance((0.0, 0.0, 0.0))
+
+    @cached_property
+    def solid(self) -> Solid:
+        """What kernels know of it."""
+        return Solid(self.bvh, self.field, EXACT_WITHIN_CELLS * self.field.cell_m, self.center_of_mass)
+
+    @cached_property
+    def rays(self) -> RayScene:
+        """Ray scene, made on first use."""
+        return ray_scene(self.bvh)
+
+    def distance(self, p_object: tuple[float, float, float]) -> float:
+        """Exact signed distance of one point in the object's frame."""
+        return _distance(self.solid, *p_object)
+
+    def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
+        """Exact distances of `points (N, 3)` in the object's frame: signed `(N,)`, negative inside; unit directions
+        away from the surface `(N, 3)`; closest surface points `(N, 3)`."""
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        distance, normal = np.empty(len(points)), np.empty((len(points), 3))
+        _signed_distances(self.bvh, self.field, points, np.inf, distance, normal)
+        return distance, normal, points - distance[:, None] * normal
+
+    def trace(self, origins: Array, directions: Array) -> Array:
+        """Distance `(N,)` along unit `directions (N, 3)` to the first hit, `inf` without one."""
+        return self.rays.trace(origins, directions)[0]
+
+
+@kernel
+def _distance(solid, x, y, z):
+    return signed_distance(solid.bvh, solid.field, x, y, z, np.inf)[0]
+
+
+@kernel
+def _signed_distances(bvh, field, points, exact_within_m, distance, normal):
+    for i in range(len(points)):
+        d, x, y, z = signed_distance(bvh, field, points[i, 0], points[i, 1], points[i, 2], exact_within_m)
+        distance[i], normal[i, 0], normal[i, 1], normal[i, 2] = d, x, y, z
+
+
+def load_shape(path: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> Shape:
+    """Read a mesh file and build its shape. Raises `MeshError` as `load_mesh` does."""
+    return build_shape(load_mesh(path, unit, scale, name))
+
+
+def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
+    """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
+    folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
+    path = folder / cache_name(mesh)
+    parts = _read_cache(path) or _read_cache(PREBUILT_FOLDER / path.name)
+    if parts is None:
+        sensed = simplified(mesh)
+        bvh = build_bvh(sensed.vertices, sensed.faces)
+        parts = bvh, build_field(bvh)
+        _write_cache(path, *parts)
+    mass = mass_properties(mesh.vertices[mesh.faces])
+    inertia = np.asarray(mass["inertia"]) / mass["mass"]
+    return Shape(mesh, *parts, np.asarray(mass["center_mass"]), float(mass["volume"]), inertia)
+
+
+def cache_name(mesh: ClosedMesh) -> str:
+    """File name of a mesh's shape in any cache folder."""
+    fewer = f"-{FEWER_TRIANGLES}" if len(mesh.faces) > MOST_TRIANGLES else ""
+    return f"{mesh.content_hash[:32]}-{_CACHE_VERSION}{fewer}.npz"
+
+
+def _read_cache(path: Path) -> tuple[Bvh, Field] | None:
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+            bvh = Bvh(*(data[name] for name in Bvh._fields))
+            return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        _log.warning("shape cache %s is unreadable (%s); building the shape again", path, error)
+        return None
+
+
+def _write_cache(path: Path, bvh: Bvh, field: Field) -> None:
+    part = path.with_suffix(f".{os.getpid()}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(part, "wb") as file:
+            np.savez(file, **bvh._asdict(), **field._asdict())
+        part.replace(path)
+    except OSError as error:
+        _log.warning("shape cache %s cannot be written (%s); the next start builds it again", path, error)

@@ -1,0 +1,138 @@
+"""Proximity sensors: rays off 104 points of the palm side (paper, section 5.2)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from manipnet.geometry import Array
+from manipnet.jit import inner, kernel
+from manipnet.synthesis.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
+from manipnet.synthesis.objects.rays import RayScene
+from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
+
+SENSOR_COUNT = len(SENSOR_BONES)
+_ROUNDING_M = 1e-5
+"""Rays are traced in single precision: one that passes a box this near may touch what fills it."""
+
+
+class Sensors(NamedTuple):
+    """Points of the skin with the bones they follow: an argument of the kernels, because compiled code is cached by
+    its own file and would not notice another surface."""
+
+    bones: np.ndarray
+    weights: Array
+    points: Array
+    normals: Array
+
+
+SENSORS = Sensors(SENSOR_BONES, SENSOR_WEIGHTS, SENSOR_POINTS, SENSOR_NORMALS)
+
+
+class Rays(NamedTuple):
+    """Room for rays in the coordinates of the object they are traced against, at most `N` of them."""
+
+    origins: np.ndarray
+    """`(N, 3)` float32."""
+    directions: np.ndarray
+    """`(N, 3)` float32, unit."""
+    places: np.ndarray
+    """`(N, 2)` int32: row and column of each ray's reading among the features."""
+
+
+def room_for_rays(count: int) -> Rays:
+    """Room for `count` rays."""
+    return Rays(np.empty((count, 3), np.float32), np.empty((count, 3), np.float32), np.empty((count, 2), np.int32))
+
+
+@inner
+def place_sensors(sensors, positions, rotations, points, normals):
+    """Skin the sensors to a pose: `positions (22, 3)`, `rotations (17, 3, 3)` into `points`, `normals (104, 3)`."""
+    for s in range(SENSOR_COUNT):
+        for i in range(3):
+            points[s, i] = normals[s, i] = 0.0
+        for k in range(sensors.bones.shape[1]):
+            weight, bone = sensors.weights[s, k], sensors.bones[s, k]
+            if weight == 0.0:
+                continue
+            for i in range(3):
+                p, n = positions[bone, i], 0.0
+                for j in range(3):
+                    p += rotations[bone, i, j] * sensors.points[s, k, j]
+                    n += rotations[bone, i, j] * sensors.normals[s, k, j]
+                points[s, i] += weight * p
+                normals[s, i] += weight * n
+        length = np.sqrt(normals[s, 0] ** 2 + normals[s, 1] ** 2 + normals[s, 2] ** 2)
+        for i in range(3):
+            normals[s, i] /= length
+
+
+@inner
+def aim_rays(box, rotation, translation, scale, points, normals, row, readings, first_column, rays, count):
+    """Carry the sensors of one instant into the object's coordinates, as rays from number `count` on; returns the new
+    count.
+
+    A ray that cannot reach the object's `box (6,)` reads its full range: that is written into `readings` from
+    `first_column` on, and the ray left out. `row` and column are noted with the others.
+    """
+    reach, size = SENSOR_RANGE_M / scale, 1.0 / scale
+    for s in range(SENSOR_COUNT):
+        column = first_column + s
+        readings[column] = SENSOR_RANGE_M
+        enter, leave = 0.0, reach
+        for i in range(3):
+            p, d = translation[i], 0.0
+            for j in range(3):
+                p += rotation[i, j] * points[s, j]
+                d += rotation[i, j] * normals[s, j]
+            p *= size
+            rays.origins[count, i], rays.directions[count, i] = p, d
+            below, above = box[i] - _ROUNDING_M - p, box[3 + i] + _ROUNDING_M - p
+            if abs(d) < 1e-9:
+                if below > 0.0 or above < 0.0:
+                    leave = -1.0
+            else:
+                per_m = 1.0 / d
+                near, far = below * per_m, above * per_m
+                enter, leave = max(enter, min(near, far)), min(leave, max(near, far))
+        if enter <= leave:
+            rays.places[count, 0], rays.places[count, 1] = row, column
+            count += 1
+    return count
+
+
+def read_rays(scene: RayScene, rays: Rays, count: int, scale: Array, rows: np.ndarray) -> None:
+    """Trace the first `count` rays and put their readings, metres, into the features `rows (N, 2356)`.
+
+    `scale (N,)` is the object's. Positive outside, at most +10 cm. A first hit on a surface that faces away means the
+    sensor is inside: the ray is reversed and the reading negative, at least -10 cm.
+    """
+    if count == 0:
+        return
+    distance, inside = scene.trace(rays.origins[:count], rays.directions[:count])
+    buried = _put_readings(distance, inside, rays, scale, rows)
+    if buried:
+        depth, _ = scene.trace(rays.origins[:buried], rays.directions[:buried])
+        _put_depths(depth, rays, scale, rows)
+
+
+@kernel
+def _put_readings(distance, inside, rays, scale, rows):
+    """Write what rays read, turn those around that began inside, and return how many these are."""
+    buried = 0
+    for k in range(len(distance)):
+        row, column = rays.places[k, 0], rays.places[k, 1]
+        rows[row, column] = min(distance[k] * scale[row], SENSOR_RANGE_M)
+        if inside[k]:
+            for i in range(3):
+                rays.origins[buried, i] = rays.origins[k, i]
+                rays.directions[buried, i] = -rays.directions[k, i]
+            rays.places[buried, 0], rays.places[buried, 1] = row, column
+            buried += 1
+    return buried
+
+
+@kernel
+def _put_depths(depth, rays, scale, rows):
+    for k in range(len(depth)):
+        row, column = rays.places[k, 0], rays.places[k, 1]
+        rows[row, column] = -min(depth[k] * scale[row], SENSOR_RANGE_M)

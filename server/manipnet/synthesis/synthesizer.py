@@ -1,0 +1,209 @@
+"""One tick: from where wrists and objects are to the pose of every hand. No clock, no sockets, no files.
+
+The same code runs live, in replay, offline, in training and in evaluation.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from manipnet.geometry import (
+    Array,
+    compose,
+    matrix_to_quat,
+    mirror_points,
+    mirror_poses,
+    mirror_quats,
+    quat_multiply,
+    transform,
+)
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.ik.pose import POSERS, SOLVERS, Poses, SolverName, room_for_poses
+from manipnet.synthesis.model.bundle import Bundle
+from manipnet.synthesis.model.features import RAYS_PER_HAND, Windows, sense
+from manipnet.synthesis.model.layout import INPUT_SIZE, PRESENT, WINDOW_OFFSETS_S
+from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.sensing.proximity import room_for_rays
+
+Side = Literal["left", "right"]
+ABSENT_HAND_M = 0.45
+"""Distance at which a hand that is not tracked is assumed to be."""
+_SIGNS: dict[Side, Array] = {"left": mirror_poses(np.ones(7)), "right": np.ones(7)}
+"""What makes a pose the one of a right hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class HandScene:
+    """What one hand can know at one tick: world trajectories sampled at `WINDOW_OFFSETS_S` about it."""
+
+    side: Side
+    wrist: Array
+    """`(21, 7)`."""
+    other_wrist: Array | None
+    """`(21, 7)`, or None where the other hand is not tracked."""
+    object: Array
+    """`(21, 7)` poses of the object's mesh frame."""
+    shape: Shape
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class HandState:
+    """What a hand carries from tick to tick: the pose it feels itself in, which is what it shows but for part of the
+    last correction; in its own wrist frame, as a right hand."""
+
+    angles: Array
+    """`(20,)` radians."""
+    positions: Array
+    """`(22, 3)` metres."""
+    rotations: Array
+    """`(17, 3, 3)`."""
+    correction: Array
+    """`(20,)` what inverse kinematics added to the network's angles, radians."""
+
+
+@dataclass(frozen=True, eq=False)
+class HandStep:
+    """The pose of one hand at one tick, in its own wrist frame, as a right hand."""
+
+    state: HandState
+    angles: Array
+    """`(20,)` radians."""
+    positions: Array
+    """`(22, 3)` metres."""
+    rotations: Array
+    """`(17, 3, 3)`."""
+    distances: Array
+    """`(22,)` joint to surface as predicted, metres, in [0, 0.035]."""
+    raw_positions: Array
+    """`(22, 3)` before inverse kinematics."""
+
+
+def state_of(angles: Array) -> HandState:
+    """The state of a hand posed by `angles (20,)`."""
+    return HandState(angles, *forward_kinematics(angles), np.zeros(len(angles)))
+
+
+def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations: Array) -> tuple[Array, Array]:
+    """Carry poses from the canonical wrist frame to the world, mirroring a left hand back.
+
+    `T_world_wrist (..., 7)` is the real wrist, `positions (..., 22, 3)`, `rotations (..., 17, 3, 3)`. Returns
+    positions `(..., 22, 3)` and quaternions `(..., 17, 4)`.
+    """
+    quats = matrix_to_quat(rotations)
+    if side == "left":
+        positions, quats = mirror_points(positions), mirror_quats(quats)
+    wrist = T_world_wrist[..., None, :]
+    return transform(wrist, positions), quat_multiply(wrist[..., 3:], quats)
+
+
+def windows_of(scenes: Sequence[HandScene]) -> Windows:
+    """Scenes as the network sees them: left hands mirrored into right ones."""
+    windows = _room_for_windows(len(scenes))
+    for n, scene in enumerate(scenes):
+        _put_scene(windows, n, scene)
+    return windows
+
+
+def _room_for_windows(count: int) -> Windows:
+    shape = (count, len(WINDOW_OFFSETS_S))
+    return Windows(
+        np.empty((*shape, 7)), np.empty((*shape, 3)), np.empty((*shape, 7)), np.empty(count, np.bool_), np.empty(count)
+    )
+
+
+def _put_scene(windows: Windows, n: int, scene: HandScene) -> None:
+    signs = _SIGNS[scene.side]
+    np.multiply(scene.wrist, signs, windows.wrist[n])
+    np.multiply(scene.object, signs, windows.object[n])
+    np.multiply(_other_positions(scene), signs[:3], windows.other_wrist[n])
+    windows.mirrored[n], windows.scale[n] = scene.side == "left", scene.scale
+
+
+def _other_positions(scene: HandScene) -> Array:
+    if scene.other_wrist is not None:
+        return scene.other_wrist[:, :3]
+    aside = np.array([0.0, 0.0, ABSENT_HAND_M, 0.0, 0.0, 0.0, 1.0])
+    return compose(scene.wrist[PRESENT], aside)[:3]
+
+
+class Synthesizer:
+    """Steps any number of hands by one tick, as one batch through the network."""
+
+    def __init__(
+        self,
+        bundle: Bundle,
+        solver: SolverName = "least_squares",
+        on_stage: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """`on_stage` hears the name of each stage as it ends: `sense`, `infer`, `ik`."""
+        if solver not in SOLVERS:
+            raise ValueError(f"solver {solver!r} is unknown; allowed are {', '.join(SOLVERS)}")
+        self._bundle, self._pose, self._on_stage = bundle, POSERS[solver], on_stage
+        self._batches: dict[int, _Batch] = {}
+
+    def rest_state(self) -> HandState:
+        """The neutral pose every hand starts from."""
+        return state_of(self._bundle.rest_angles)
+
+    def step(self, scenes: Sequence[HandScene], states: Sequence[HandState]) -> list[HandStep]:
+        """The next pose of each hand, from its scene at this tick and its state after the last one."""
+        if not scenes:
+            return []
+        count, bundle = len(scenes), self._bundle
+        if count not in self._batches:
+            self._batches[count] = _Batch(count)
+        batch, poses = self._batches[count], room_for_poses(count)
+        order = sorted(range(count), key=lambda index: id(scenes[index].shape))
+        for n, index in enumerate(order):
+            batch.put(n, scenes[index], states[index])
+            poses.correction[n] = states[index].correction
+        groups = _groups([scenes[index].shape for index in order])
+        for shape, first, last in groups:
+            sense(shape, batch.windows, batch.positions, batch.rotations, first, last, batch.rays, batch.rows)
+        self._on_stage("sense")
+        outputs = bundle.infer(batch.rows)
+        self._on_stage("infer")
+        for shape, first, last in groups:
+            self._pose(
+                shape.solid,
+                batch.windows,
+                outputs,
+                batch.angles,
+                bundle.response,
+                bundle.limits,
+                first,
+                last,
+                poses,
+            )
+        steps = dict(zip(order, _steps(poses), strict=True))
+        self._on_stage("ik")
+        return [steps[index] for index in range(count)]
+
+
+class _Batch:
+    """What the kernels take of so many hands: made once, filled at every tick."""
+
+    def __init__(self, count: int) -> None:
+        self.windows = _room_for_windows(count)
+        self.angles, self.positions, self.rotations = room_for_poses(count)[:3]
+        self.rays = room_for_rays(count * RAYS_PER_HAND + 1)
+        self.rows = np.empty((count, INPUT_SIZE), np.float32)
+
+    def put(self, n: int, scene: HandScene, state: HandState) -> None:
+        """Let a hand be number `n`."""
+        _put_scene(self.windows, n, scene)
+        self.angles[n], self.positions[n], self.rotations[n] = state.angles, state.positions, state.rotations
+
+
+def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
+    """Stretches of one shape: the shape, the first hand, one past the last."""
+    starts = [n for n, shape in enumerate(shapes) if n == 0 or shape is not shapes[n - 1]]
+    return [(shapes[first], first, last) for first, last in zip(starts, [*starts[1:], len(shapes)], strict=True)]
+
+
+def _steps(poses: Poses) -> Iterator[HandStep]:
+    for angles, positions, rotations, correction, distances, raw, felt, at, turned in zip(*poses, strict=True):
+        yield HandStep(HandState(felt, at, turned, correction), angles, positions, rotations, distances, raw)

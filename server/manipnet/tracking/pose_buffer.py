@@ -1,0 +1,163 @@
+"""The recent poses of one streamed body, and their interpolation by time."""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+
+from manipnet.geometry import Array
+from manipnet.jit import inner, kernel
+
+KEEP: Final = 1024
+"""Newest samples kept: more than 2 s at the highest rate accepted."""
+MIN_SPACING_S: Final = 0.0015
+"""Samples closer than this to their neighbour are not taken: no tracker is that fast."""
+TIME_TOLERANCE_S: Final = 1e-6
+"""Two clocks readings this near are the same instant: times are sums of rounded fractions."""
+
+Forecast = Callable[[Array, Array, Array], Array]
+"""`(history times (m,), history poses (m, 7), times (n,)) -> poses (n, 7)`; the history ends before the
+times.
+"""
+
+
+class BodyTrack:
+    """Time-ordered poses of one body on its sender's clock; samples may arrive late or in the wrong order."""
+
+    def __init__(self) -> None:
+        self._times = np.empty(2 * KEEP)
+        self._poses = np.empty((2 * KEEP, 7))
+        self._count = 0
+        self.seen_s = -np.inf
+        """Newest instant this body was heard of, tracked or not."""
+
+    @property
+    def times(self) -> Array:
+        """Sample times, rising, `(n,)` seconds."""
+        return self._times[: self._count]
+
+    @property
+    def poses(self) -> Array:
+        """World poses at `times`, `(n, 7)`, neighbouring quaternions in the same hemisphere."""
+        return self._poses[: self._count]
+
+    def add(self, t_s: float, pose: Array | Sequence[float]) -> bool:
+        """Put one tracked pose in its place; False when there is one at (nearly) that instant already."""
+        at = (
+            int(np.searchsorted(self.times, t_s))
+            if self._count and t_s <= self._times[self._count - 1]
+            else self._count
+        )
+        for neighbour in (at - 1, at):
+            if 0 <= neighbour < self._count and abs(self._times[neighbour] - t_s) < MIN_SPACING_S:
+                return False
+        if self._count == len(self._times):
+            self._forget()
+            at -= KEEP
+            if at < 0:
+                return False
+        self._times[at + 1 : self._count + 1] = self._times[at : self._count]
+        self._poses[at + 1 : self._count + 1] = self._poses[at : self._count]
+        self._times[at], self._poses[at] = t_s, pose
+        self._count += 1
+        self._align(at)
+        return True
+
+    def interval_s(self) -> float:
+        """Median spacing of the newest samples; infinite before the second one."""
+        newest = self.times[-16:]
+        return float(np.median(np.diff(newest))) if len(newest) > 1 else np.inf
+
+    def age_s(self, t_s: float) -> float:
+        """Time since the newest tracked sample at or before `t_s`; infinite when there is none."""
+        before = int(np.searchsorted(self.times, t_s + TIME_TOLERANCE_S))
+        return max(t_s - float(self._times[before - 1]), 0.0) if before else np.inf
+
+    def _align(self, at: int) -> None:
+        """Keep every neighbouring pair of quaternions in one hemisphere (trackers flip signs freely)."""
+        if at and self._poses[at, 3:] @ self._poses[at - 1, 3:] < 0.0:
+            self._poses[at, 3:] *= -1.0
+        for i in range(at + 1, self._count):
+            if self._poses[i, 3:] @ self._poses[i - 1, 3:] >= 0.0:
+                break
+            self._poses[i, 3:] *= -1.0
+
+    def _forget(self) -> None:
+        self._times[:KEEP] = self._times[KEEP:].copy()
+        self._poses[:KEEP] = self._poses[KEEP:].copy()
+        self._count = KEEP
+
+
+def sample(
+    tracks: Sequence[BodyTrack], times_s: Array, present_s: float, until_s: float, forecast: Forecast | None
+) -> tuple[Array, list[float]]:
+    """Poses of several non-empty tracks at rising `times_s (n,)`: `(len(tracks), n, 7)`, and their ages at `present_s`.
+
+    Positions are interpolated linearly, rotations on the shortest arc, both by time. Only samples up to `until_s`
+    and the one that brackets it are used. Before the first sample its pose stands; after the last one `forecast`
+    continues the motion, or the last pose stands when there is none.
+    """
+    poses, ages = np.empty((len(tracks), len(times_s), 7)), []
+    for row, track in zip(poses, tracks, strict=True):
+        known, age_s = _resample(track.times, track.poses, times_s, present_s, until_s, row)
+        ages.append(age_s)
+        if forecast is not None and times_s[-1] > (last_s := track.times[known - 1] + TIME_TOLERANCE_S):
+            beyond = int(np.searchsorted(times_s, last_s, side="right"))
+            row[beyond:] = forecast(track.times[:known], track.poses[:known], times_s[beyond:])
+    return poses, ages
+
+
+@inner
+def _count_before(times, t_s):
+    """How many of the rising `times` are before an instant."""
+    low, high = 0, len(times)
+    while low < high:
+        middle = (low + high) >> 1
+        if times[middle] < t_s:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@kernel
+def _resample(times, poses, at, present_s, until_s, out):
+    """Poses at the rising instants `at` between rising `times`, clamped at both ends, into `out`.
+
+    Returns how many samples serve instants up to `until_s` (up to the first at or after it, which brackets it), and
+    the age at `present_s` of the newest sample then; infinite when there is none.
+    """
+    known = min(_count_before(times, until_s - TIME_TOLERANCE_S) + 1, len(times))
+    before = _count_before(times, present_s + TIME_TOLERANCE_S)
+    age_s = max(present_s - times[before - 1], 0.0) if before > 0 else np.inf
+    after = _count_before(times[:known], at[0])
+    for i in range(len(at)):
+        while after < known and times[after] <= at[i]:
+            after += 1
+        if after == 0 or after == known:
+            for k in range(7):
+                out[i, k] = poses[min(after, known - 1), k]
+            continue
+        before = after - 1
+        fraction = (at[i] - times[before]) / (times[after] - times[before])
+        for k in range(3):
+            out[i, k] = poses[before, k] + fraction * (poses[after, k] - poses[before, k])
+        _slerp_into(poses[before, 3:], poses[after, 3:], fraction, out[i, 3:])
+    return known, age_s
+
+
+@inner
+def _slerp_into(a, b, fraction, out):
+    """Between unit quaternions of one hemisphere, on the arc between them."""
+    cosine = min(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3], 1.0)
+    angle = np.arccos(cosine)
+    sine = np.sin(angle)
+    from_a, from_b = 1.0 - fraction, fraction
+    if sine > 1e-6:
+        from_a, from_b = np.sin((1.0 - fraction) * angle) / sine, np.sin(fraction * angle) / sine
+    length = 0.0
+    for k in range(4):
+        out[k] = from_a * a[k] + from_b * b[k]
+        length += out[k] * out[k]
+    for k in range(4):
+        out[k] /= np.sqrt(length)

@@ -1,0 +1,40 @@
+"""Hands out: the message, declared once (`schema`), and its two encodings.
+
+A ZeroMQ frame is a topic followed at once by a payload.
+"""
+
+from manipnet.wire.binary_codec import decode_binary, encode_binary
+from manipnet.wire.hands import (
+    SIDES,
+    STATES,
+    TOPIC_BIN,
+    TOPIC_MSGPACK,
+    VERSION,
+    BodyPose,
+    HandPose,
+    HandsMessage,
+    Latency,
+    Side,
+    State,
+)
+from manipnet.wire.msgpack_codec import decode_msgpack, encode_msgpack
+from manipnet.wire.validation import check
+
+__all__ = [
+    "SIDES",
+    "STATES",
+    "TOPIC_BIN",
+    "TOPIC_MSGPACK",
+    "VERSION",
+    "BodyPose",
+    "HandPose",
+    "HandsMessage",
+    "Latency",
+    "Side",
+    "State",
+    "check",
+    "decode_binary",
+    "decode_msgpack",
+    "encode_binary",
+    "encode_msgpack",
+]

@@ -1,0 +1,161 @@
+"""The hands message as fixed little-endian records, the payload of the topic `pose/bin`.
+
+A header, then a record per hand, then a record per body. Each record's size travels in the header, so a later
+writer may append fields and this reader steps over them.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from manipnet.wire.bodies import MAX_BODIES, MessageError
+from manipnet.wire.hands import (
+    BODY,
+    HAND,
+    HEADER,
+    LATENCY,
+    MAGIC,
+    NAME,
+    NAME_BYTES,
+    PREAMBLE,
+    RECORDS,
+    SIDES,
+    STATES,
+    VERSION,
+    BodyPose,
+    HandPose,
+    HandsMessage,
+    Latency,
+)
+from manipnet.wire.validation import check, require_version
+
+
+def encode_binary(message: HandsMessage) -> bytes:
+    """The fixed records of `docs/protocol.md`; names are cut to `NAME_BYTES`, at a character.
+
+    Raises `MessageError` rather than send a number that is not finite.
+    """
+    check(message)
+    header = np.zeros((), HEADER)
+    hands = np.zeros(len(message.hands), HAND)
+    bodies = np.zeros(len(message.bodies), BODY)
+    sizes = (HEADER.itemsize, HEADER.itemsize + hands.nbytes + bodies.nbytes, HAND.itemsize, BODY.itemsize)
+    preamble = (MAGIC, VERSION, *sizes, len(hands), len(bodies))
+    for name, value in zip(PREAMBLE.names or (), preamble, strict=True):
+        header[name] = value
+    _fill(header, message)
+    for name in LATENCY.names or ():
+        header["latency_ms"][name] = getattr(message.latency_ms, name)
+    for record, (side, hand) in zip(hands, message.hands.items(), strict=True):
+        record["side"], record["has_object"] = SIDES.index(side), hand.object is not None
+        _fill(record, hand)
+    for record, body in zip(bodies, message.bodies, strict=True):
+        _fill(record, body)
+    return header.tobytes() + hands.tobytes() + bodies.tobytes()
+
+
+def decode_binary(payload: bytes) -> HandsMessage:
+    """Inverse of `encode_binary`, to float32; longer records of a later writer are read by their known part.
+
+    Raises `MessageError` and nothing else.
+    """
+    header, hands, bodies = _split_records(payload)
+    message = HandsMessage(
+        **_read(HandsMessage, header, "header"),
+        hands={SIDES[_index(r["side"], SIDES, f"hands[{i}].side")]: _hand(r, i) for i, r in enumerate(hands)},
+        bodies=tuple(BodyPose(**_read(BodyPose, r, f"bodies[{i}]")) for i, r in enumerate(bodies)),
+        latency_ms=Latency(*(float(x) for x in header["latency_ms"].item())),
+    )
+    if len(message.hands) != len(hands):
+        raise MessageError("the same hand occurs twice; a message holds at most one left and one right hand")
+    check(message)
+    return message
+
+
+def _split_records(payload: bytes) -> tuple[np.void, list[np.void], list[np.void]]:
+    """The known part of the header, of each hand and of each body."""
+    if len(payload) < PREAMBLE.itemsize or payload[:4] != MAGIC:
+        raise MessageError(f"message does not start with {MAGIC.decode()} and a header; it is not pose/bin")
+    pre = {name: int(value) for name, value in zip(_NUMBERS, _numbers(payload), strict=True)}
+    require_version(pre["version"])
+    for name, least in (("header", HEADER), ("hand", HAND), ("body", BODY)):
+        if pre[f"{name}_size"] < least.itemsize:
+            raise MessageError(f"{name}_size is {pre[f'{name}_size']}; it must be at least {least.itemsize}")
+    for name, most in (("hand", len(SIDES)), ("body", MAX_BODIES)):
+        if pre[f"{name}_count"] > most:
+            raise MessageError(f"{name}_count is {pre[f'{name}_count']}; at most {most} are allowed")
+    first_body = pre["header_size"] + pre["hand_count"] * pre["hand_size"]
+    total = first_body + pre["body_count"] * pre["body_size"]
+    if not len(payload) == total == pre["total_size"]:
+        raise MessageError(f"message has {len(payload)} bytes; its header promises {total}")
+    return (
+        np.frombuffer(payload, HEADER, 1)[0],
+        _records(payload, HAND, pre["header_size"], pre["hand_size"], pre["hand_count"]),
+        _records(payload, BODY, first_body, pre["body_size"], pre["body_count"]),
+    )
+
+
+_NUMBERS = (PREAMBLE.names or ())[1:]
+
+
+def _numbers(payload: bytes) -> tuple[int, ...]:
+    return np.frombuffer(payload, PREAMBLE, 1)[0].item()[1:]
+
+
+def _records(payload: bytes, dtype: np.dtype, start: int, stride: int, count: int) -> list[np.void]:
+    return [np.frombuffer(payload, dtype, 1, start + i * stride)[0] for i in range(count)]
+
+
+def _hand(record: np.void, index: int) -> HandPose:
+    values = _read(HandPose, record, f"hands[{index}]")
+    if not record["has_object"]:
+        values["object"] = None
+    return HandPose(**values)
+
+
+def _fill(record: Any, value: Any) -> None:
+    """Copy a dataclass's fields into its record."""
+    for name, dtype in RECORDS[type(value)]:
+        field_value = getattr(value, name)
+        if dtype == NAME:
+            text = _cut(field_value or "")
+            record[name]["length"] = len(text)
+            record[name]["text"][: len(text)] = np.frombuffer(text, np.uint8)
+        else:
+            record[name] = STATES.index(field_value) if name == "state" else field_value
+
+
+def _read(cls: type, record: np.void, where: str) -> dict[str, Any]:
+    """A record's fields as a dataclass's keyword arguments."""
+    values: dict[str, Any] = {}
+    for name, dtype in RECORDS[cls]:
+        raw = record[name]
+        if dtype == NAME:
+            values[name] = _text(raw, f"{where}.{name}")
+        elif name == "state":
+            values[name] = STATES[_index(raw, STATES, f"{where}.state")]
+        elif name == "tracked":
+            values[name] = bool(raw)
+        else:
+            values[name] = raw.astype(np.float64) if raw.shape else raw.item()
+    return values
+
+
+def _cut(text: str) -> bytes:
+    return text.encode()[:NAME_BYTES].decode(errors="ignore").encode()
+
+
+def _text(raw: np.void, where: str) -> str:
+    length = int(raw["length"])
+    if length > NAME_BYTES:
+        raise MessageError(f"{where} has {length} bytes; at most {NAME_BYTES} are allowed")
+    try:
+        return raw["text"][:length].tobytes().decode()
+    except UnicodeDecodeError:
+        raise MessageError(f"{where} is not UTF-8") from None
+
+
+def _index(raw: Any, words: tuple[str, ...], where: str) -> int:
+    if not int(raw) < len(words):
+        raise MessageError(f"{where} is {int(raw)}; allowed are 0 … {len(words) - 1} ({', '.join(words)})")
+    return int(raw)

@@ -1,0 +1,76 @@
+"""What a hands message may hold, checked on the way out and on the way in."""
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from manipnet.wire.bodies import MAX_BODIES, MessageError
+from manipnet.wire.hands import (
+    RECORDS,
+    SIDES,
+    STATES,
+    VERSION,
+    Array,
+    HandPose,
+    HandsMessage,
+    Latency,
+    Side,
+)
+
+
+def check(message: HandsMessage) -> None:
+    """Raise `MessageError` unless all is allowed: finite, right shapes, unit quaternions, known words."""
+    require_version(message.v)
+    if not 0 <= message.seq < 2**64:
+        raise MessageError(f"seq is {message.seq}; it must lie in 0 … 2^64 - 1")
+    if len(message.bodies) > MAX_BODIES:
+        raise MessageError(f"bodies has {len(message.bodies)} entries; at most {MAX_BODIES} are allowed")
+    numbers = (message.t_capture, message.t_publish, message.look_ahead)
+    _check_floats(np.array(numbers), (3,), "t_capture, t_publish, look_ahead")
+    latency = [getattr(message.latency_ms, f.name) for f in fields(Latency)]
+    _check_floats(np.array(latency), (len(latency),), "latency_ms")
+    for side, hand in message.hands.items():
+        _check_hand(hand, f"hands.{known_side(side)}")
+    for i, body in enumerate(message.bodies):
+        _check_floats(body.pose, (7,), f"bodies[{i}]")
+        _check_units(body.pose[3:], f"bodies[{i}].q")
+
+
+def _check_hand(hand: HandPose, where: str) -> None:
+    if hand.state not in STATES:
+        raise MessageError(f"{where}.state is {hand.state!r}; allowed are {', '.join(STATES)}")
+    if not (np.isfinite(hand.scale) and hand.scale > 0.0):
+        raise MessageError(f"{where}.scale is {hand.scale}; it must be finite and above 0")
+    for name, dtype in RECORDS[HandPose]:
+        if dtype.shape:
+            _check_floats(getattr(hand, name), dtype.shape, f"{where}.{name}")
+    _check_units(hand.rotations, f"{where}.rotations")
+    _check_units(hand.joints[:, 3:], f"{where}.joints")
+    _check_units(hand.wrist[3:], f"{where}.wrist.q")
+
+
+def _check_floats(value: Array, shape: tuple[int, ...], where: str) -> None:
+    if value.shape != shape:
+        raise MessageError(f"{where} has the shape {value.shape}; it must be {shape}")
+    if not (np.abs(value) <= 1e12).all():  # NaN is not
+        raise MessageError(f"{where} holds a number that is not finite or beyond 1e12")
+
+
+def _check_units(quats: Array, where: str) -> None:
+    lengths = np.einsum("...i,...i->...", quats, quats)
+    if np.abs(lengths - 1.0).max() > 1e-3:
+        raise MessageError(f"{where} holds a quaternion that is not of unit length")
+
+
+def require_version(version: Any) -> None:
+    """Refuse another version, naming both."""
+    if version != VERSION or isinstance(version, bool):
+        raise MessageError(f"message is of version {version!r}; this reader understands version {VERSION}")
+
+
+def known_side(side: Any) -> Side:
+    """The side itself, or `MessageError`."""
+    if side not in SIDES:
+        raise MessageError(f"hands has the key {side!r}; allowed are {', '.join(SIDES)}")
+    return side

@@ -1,0 +1,323 @@
+"""The NatNet client against a fake Motive, over real sockets on loopback."""
+
+import ipaddress
+import itertools
+import logging
+import queue
+import socket
+import time
+
+import natnet_capture
+import pytest
+from fake_motive import CLOCK_HZ, FakeMotive
+from natnet_writer import Body, Frame, packet, server_info
+
+from manipnet.inputs.natnet import client as natnet_client
+from manipnet.inputs.natnet.client import NatNetBodies
+from manipnet.inputs.natnet.frames import read_frame
+from manipnet.net.errors import ListenError
+
+VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5)]
+Q = (0.0, 0.6, 0.0, 0.8)
+
+
+@pytest.fixture(autouse=True)
+def _hurry(monkeypatch):
+    """Chores that are done every second in life are done ten times as often here."""
+    for period in ("KNOCK_S", "KEEP_ALIVE_S", "ECHO_S"):
+        monkeypatch.setattr(natnet_client, period, 0.1)
+
+
+@pytest.fixture
+def connect(heard, counters):
+    clients = []
+
+    def connect(motive, **options):
+        client = NatNetBodies(heard, counters, "127.0.0.1", motive.port, **options)
+        clients.append(client)
+        client.start()
+        motive.wait_for(0)
+        return client
+
+    yield connect
+    for client in clients:
+        client.stop()
+
+
+@pytest.fixture
+def warnings():
+    """What the client warns of; it does so once a problem is in its status."""
+    said = queue.Queue()
+    log, handler = logging.getLogger(natnet_client.__name__), logging.Handler(logging.WARNING)
+    handler.emit = lambda record: said.put(record.getMessage())
+    log.addHandler(handler)
+    yield said
+    log.removeHandler(handler)
+
+
+def write(version, number=1, **options):
+    return Frame(number=number, **options).write(version)
+
+
+def test_the_capture_arrives_value_by_value(connect, heard):
+    datagrams = list(natnet_capture.datagrams())
+    answers = {d.data[0]: d.data[4:] for d in datagrams}
+    with FakeMotive(info=answers[1], models=answers[5]) as motive:
+        connect(motive)
+        motive.wait_for(12)  # the echo request follows the definitions
+        for payload in natnet_capture.frames():
+            expected = read_frame(payload, (3, 0))
+            motive.send(payload)
+            frame = heard.next()
+            assert (frame.frame, frame.t_s) == (expected.number, expected.timestamp_s)
+            (body,) = frame.bodies
+            assert (body.id, body.name, body.tracked) == (2, "RaceQuad", True)
+            assert body.p == expected.bodies[0].p
+            assert body.q == pytest.approx(expected.bodies[0].q, abs=1e-6)
+
+
+@pytest.mark.parametrize("version", VERSIONS, ids=lambda v: f"{v[0]}.{v[1]}")
+def test_every_version_by_the_servers_answer(connect, heard, version):
+    with FakeMotive(version, {1: "left wrist", 3: "Box"}) as motive:
+        client = connect(motive)
+        motive.wait_for(12)
+        motive.send(write(version, bodies=[Body(1, (1, 2, 3), Q), Body(3, params=0), Body(9)]))
+        frame = heard.next()
+        assert [(b.id, b.name, b.tracked) for b in frame.bodies] == [
+            (1, "left wrist", True),
+            (3, "Box", False),
+            (9, None, True),
+        ]
+        assert frame.bodies[0].p == (1.0, 2.0, 3.0)
+        assert frame.bodies[0].q == pytest.approx(Q, abs=1e-6)
+        assert frame.t_s == 12.5
+        assert frame.source.startswith("natnet:127.0.0.1:")
+        assert client.status()["state"] == "streaming"
+        assert client.status()["server"] == f"Motive, NatNet {version[0]}.{version[1]}"
+
+
+def test_z_up_becomes_y_up(connect, heard):
+    with FakeMotive() as motive:
+        connect(motive, up="z")
+        motive.wait_for(4)
+        motive.send(write((3, 0), bodies=[Body(1, (1, 2, 3), (0.1, 0.2, 0.3, 0.9273618))]))
+        (body,) = heard.next().bodies
+        assert body.p == (1.0, 3.0, -2.0)
+        assert body.q == pytest.approx((0.1, 0.3, -0.2, 0.9273618), abs=1e-6)
+
+
+def stream_until_named(motive, heard, name):
+    """Frames until the definitions, which travel on their own, have reached the client."""
+    for number in itertools.count():
+        motive.send(write(motive.version, number))
+        frame = heard.next()
+        assert frame.frame == number
+        if frame.bodies[0].name == name:
+            return
+
+
+def test_names_are_asked_for_again_when_the_frame_says_so(connect, heard):
+    with FakeMotive(names={1: "old"}) as motive:
+        connect(motive)
+        motive.wait_for(12)
+        motive.send(write((3, 0)))
+        assert heard.next().bodies[0].name == "old"
+        motive.names = {1: "new"}
+        motive.send(write((3, 0), flags=2))
+        assert heard.next().bodies[0].name == "old"
+        motive.wait_for(4, 2)
+        stream_until_named(motive, heard, "new")
+
+
+def test_the_clock_is_known_within_its_uncertainty(connect, heard):
+    with FakeMotive() as motive:
+        client = connect(motive)
+        motive.wait_for(12)
+        motive.send(write((3, 0)))  # behind the echo's answer
+        heard.next()
+        status = client.status()
+        error_s = abs(status["clock_offset_s"] - motive.clock_offset_s)
+        assert error_s <= status["clock_uncertainty_s"] + 1e-6
+
+
+def test_the_client_is_kept_alive(connect):
+    with FakeMotive() as motive:
+        connect(motive)
+        motive.wait_for(10, 2)
+
+
+def test_a_server_that_comes_late_is_found(heard, counters):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as placeholder:
+        placeholder.bind(("127.0.0.1", 0))
+        port = placeholder.getsockname()[1]
+        client = NatNetBodies(heard, counters, "127.0.0.1", port)
+        client.start()
+        assert placeholder.recv(1_000)[:2] == b"\0\0"
+        assert client.status()["state"] == "connecting"
+    with FakeMotive(port=port) as motive:
+        motive.wait_for(4)
+        motive.send(write((3, 0)))
+        assert heard.next().frame == 1
+        client.stop()
+
+
+def test_a_server_that_restarts_with_another_version_is_followed(connect, heard, monkeypatch):
+    monkeypatch.setattr(natnet_client, "SILENT_S", 0.2)
+    with FakeMotive((3, 0)) as motive:
+        connect(motive)
+        motive.wait_for(4)
+        motive.send(write((3, 0), 1))
+        assert heard.next().frame == 1
+        port = motive.port
+    with FakeMotive((4, 2), port=port) as motive:
+        motive.wait_for(4)
+        motive.send(write((4, 2), 2))
+        assert heard.next().frame == 2
+
+
+def test_multicast(connect, heard):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    with FakeMotive((4, 1), {1: "Box"}, group="239.255.42.99", data_port=port) as motive:
+        client = connect(motive, multicast=True, interface="127.0.0.1")
+        motive.wait_for(12)
+        stream_until_named(motive, heard, "Box")
+        assert 10 not in motive.requests  # no keep-alive needed
+        assert client.status()["problem"] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "info", "says"),
+    [
+        ({}, server_info(group="239.255.42.99"), "start with --multicast, or choose Unicast"),
+        ({}, server_info(version=(2, 9)), "speaks NatNet 2.9; 3.0"),
+        ({}, server_info(version=(5, 1)), "speaks NatNet 5.1; 3.0"),
+        ({"multicast": True}, server_info(group="10.0.0.1"), "cannot join multicast 10.0.0.1:1511"),
+    ],
+)
+def test_what_is_wrong_is_said_once_with_the_remedy_and_stays_said(connect, warnings, options, info, says):
+    with FakeMotive(info=info) as motive:
+        client = connect(motive, **options)
+        assert says in warnings.get(timeout=20)
+        seen = set()
+        for answers in range(2, 6):
+            motive.wait_for(0, answers)
+            seen.add(client.status()["problem"])
+    assert len(seen) == 1
+    assert says in seen.pop()
+    assert warnings.empty()
+
+
+@pytest.mark.parametrize(
+    ("garbage", "reason"),
+    [
+        (b"", "malformed"),
+        (b"garbage", "malformed"),
+        (packet(7, b""), "malformed"),
+        (packet(7, b"\xff" * 500), "malformed"),
+        (packet(1, b"short"), "malformed"),
+        (packet(5, b"\xff" * 40), "malformed"),
+        (packet(13, b""), "malformed"),
+    ],
+)
+def test_good_frame_after_garbage(connect, heard, counters, garbage, reason):
+    with FakeMotive() as motive:
+        connect(motive)
+        motive.wait_for(4)
+        motive.send(write((3, 0), 1))
+        assert heard.next().frame == 1
+        for client in motive.clients:
+            motive._data.sendto(garbage, client)
+        motive.send(write((3, 0), 2))
+        assert heard.next().frame == 2
+    assert counters.snapshot()["frames_dropped"] == {reason: 1}
+
+
+def test_packets_of_no_interest_are_passed_over(connect, heard, counters):
+    with FakeMotive() as motive:
+        connect(motive)
+        motive.wait_for(4)
+        for message_id in (3, 8, 100, 9_999):
+            motive.send(b"whatever", message_id)
+        motive.send(write((3, 0), 2))
+        assert heard.next().frame == 2
+    assert "frames_dropped" not in counters.snapshot()
+
+
+def test_other_hosts_are_refused(connect, heard, counters):
+    with FakeMotive() as motive, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        connect(motive)
+        motive.wait_for(4)
+        stranger.bind(("127.0.0.2", 0))
+        for client in motive.clients:
+            stranger.sendto(packet(7, write((3, 0), 666)), client)
+        motive.send(write((3, 0), 1))
+        assert heard.next().frame == 1
+    assert counters.snapshot()["frames_dropped"] == {"not_allowed": 1}
+
+
+def test_frames_may_come_from_listed_networks_but_answers_only_from_the_server(connect, heard, counters):
+    with FakeMotive() as motive, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second_card:
+        client = connect(motive, allow=[ipaddress.ip_network("127.0.0.2/32")])
+        motive.wait_for(12)
+        motive.send(write((3, 0), 1))
+        assert heard.next().frame == 1
+        second_card.bind(("127.0.0.2", 0))
+        for address in motive.clients:
+            second_card.sendto(packet(1, server_info(version=(2, 9))), address)
+            second_card.sendto(packet(7, write((3, 0), 2)), address)
+        assert heard.next().frame == 2
+        assert client.status()["server"] == "Motive, NatNet 3.0"
+    assert "frames_dropped" not in counters.snapshot()
+
+
+def test_a_frame_tells_when_it_was_captured_on_our_clock(connect, heard):
+    with FakeMotive() as motive:
+        client = connect(motive)
+        motive.wait_for(12)
+        exposed_s = time.monotonic() + motive.clock_offset_s - 0.004
+        motive.send(write((3, 0), timestamp_s=77.0, stamps=(int(exposed_s * CLOCK_HZ), 0, 0)))
+        frame, status = heard.next(), client.status()
+        captured_s = frame.t_s - status["capture_offset_s"]
+        error_s = captured_s - (exposed_s - motive.clock_offset_s)
+        assert abs(error_s) <= status["clock_uncertainty_s"] + 2 / CLOCK_HZ
+        assert captured_s < frame.t_received_s
+
+
+def test_frames_before_the_version_is_known_are_not_guessed_at(heard, counters):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as motive:
+        motive.bind(("127.0.0.1", 0))
+        client = NatNetBodies(heard, counters, *motive.getsockname())
+        client.start()
+        _, address = motive.recvfrom(1_000)
+        motive.sendto(packet(7, write((3, 0), 1)), address)
+        motive.sendto(packet(1, server_info()), address)
+        motive.sendto(packet(7, write((3, 0), 2)), address)
+        assert heard.next().frame == 2
+        client.stop()
+    assert counters.snapshot()["frames_dropped"] == {"unsupported": 1}
+
+
+def test_bad_pose_of_one_body_spares_the_others(connect, heard):
+    with FakeMotive() as motive:
+        connect(motive)
+        motive.wait_for(4)
+        motive.send(write((3, 0), bodies=[Body(1, (float("nan"), 0, 0)), Body(2, q=(0, 0, 0, 0)), Body(3)]))
+        assert [body.fault for body in heard.next().bodies] == ["nan", "zero_quaternion", None]
+
+
+@pytest.mark.parametrize(
+    ("host", "options", "says"),
+    [
+        ("no-such-host.invalid", {}, "cannot find the NatNet server 'no-such-host.invalid'"),
+        ("127.0.0.1", {"interface": "203.0.113.9"}, "203.0.113.9:0: Cannot assign requested address"),
+    ],
+)
+def test_wrong_places_are_named(heard, counters, host, options, says):
+    with pytest.raises(ListenError, match=says):
+        NatNetBodies(heard, counters, host, **options).start()
+
+
+def test_stop_without_start(heard, counters):
+    NatNetBodies(heard, counters, "127.0.0.1").stop()

@@ -1,0 +1,66 @@
+"""Who sends, how often, and how far its clock is: by frames whose way is made up."""
+
+import random
+
+import pytest
+
+from manipnet.inputs.sender_stats import CLOCK_S, MOST, RATE_S, Senders
+from manipnet.wire.bodies import BodyFrame
+
+
+def frames(rate_hz, seconds, offset_s=100.0, way_s=0.0, start_s=0.0, source="osc:a"):
+    way = random.Random(3)
+    for n in range(round(rate_hz * seconds)):
+        t_s = start_s + n / rate_hz
+        yield BodyFrame(t_s + offset_s, n, (), t_s + way_s * way.random(), source)
+
+
+@pytest.fixture
+def passed():
+    return []
+
+
+@pytest.fixture
+def senders(passed):
+    return Senders(passed.append)
+
+
+def test_every_frame_is_handed_on_and_counted(senders, passed):
+    given = list(frames(120, 3.0))
+    for frame in given:
+        senders(frame)
+    assert passed == given
+    (said,) = senders.report(3.0).values()
+    assert said["frames"] == 360
+    assert said["rate_hz"] == pytest.approx(120.0)
+    assert said["age_s"] == pytest.approx(1 / 120)
+    assert senders.report(3.0 + 3 * RATE_S)["osc:a"]["rate_hz"] == 0.0
+
+
+def test_the_fastest_frame_tells_the_clock(senders):
+    for frame in frames(120, 5.0, way_s=0.05):
+        senders(frame)
+    offset_s = senders.report(5.0)["osc:a"]["clock_offset_s"]
+    assert 100.0 - 2e-3 < offset_s <= 100.0
+    assert senders.report(5.0)["osc:a"]["clock_uncertainty_s"] is None
+
+
+def test_a_clock_that_drifts_is_followed(senders):
+    for step in range(100):
+        for frame in frames(30, 1.0, offset_s=100.0 - 1e-4 * step, start_s=float(step)):
+            senders(frame)
+    offset_s = senders.report(100.0)["osc:a"]["clock_offset_s"]
+    assert abs(offset_s - (100.0 - 1e-4 * 99)) < 2.1 * CLOCK_S * 1e-4
+
+
+def test_a_sender_that_starts_anew_has_another_clock(senders):
+    for frame in [*frames(60, 5.0), *frames(60, 1.0, offset_s=-5.0, start_s=5.0)]:
+        senders(frame)
+    assert senders.report(6.0)["osc:a"]["clock_offset_s"] == pytest.approx(-5.0)
+    assert senders.report(6.0)["osc:a"]["frames"] == 360
+
+
+def test_memory_is_bounded_and_the_newest_are_kept(senders):
+    for n in range(3 * MOST):
+        senders(BodyFrame(1.0, n, (), 0.0, f"osc:{n}"))
+    assert set(senders.report(1.0)) == {f"osc:{n}" for n in range(2 * MOST, 3 * MOST)}

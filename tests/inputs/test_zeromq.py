@@ -1,0 +1,159 @@
+"""Bodies over ZeroMQ, through real sockets on free loopback ports."""
+
+import json
+import threading
+
+import msgpack
+import pytest
+import zmq
+
+from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.net.errors import ListenError
+from manipnet.net.zmq_socket import MAX_WIRE_BYTES
+from manipnet.wire.bodies import MAX_MESSAGE_BYTES
+
+
+def message(frame):
+    return {"t": frame / 120, "frame": frame, "bodies": [{"id": 1, "p": [0, 0, 0], "q": [0, 0, 0, 1]}]}
+
+
+@pytest.fixture
+def receiver(heard, counters):
+    receiver = ZmqBodies(heard, counters, port=0)
+    receiver.start()
+    yield receiver
+    receiver.stop()
+
+
+@pytest.fixture
+def context():
+    with zmq.Context() as context:
+        yield context
+
+
+def sender(context, address, kind=zmq.XPUB):
+    """A publisher that is heard from its first message on: it has seen the subscription."""
+    publisher = context.socket(kind)
+    publisher.setsockopt(zmq.LINGER, 5_000)
+    publisher.setsockopt(zmq.XPUB_VERBOSE, 1)
+    publisher.connect(address)
+    assert publisher.poll(20_000)
+    assert publisher.recv() == b"\x01"
+    return publisher
+
+
+@pytest.mark.parametrize("encode", [msgpack.packb, lambda m: json.dumps(m).encode()])
+def test_frames_arrive_in_order(receiver, heard, context, encode):
+    with sender(context, receiver.address) as publisher:
+        for n in range(20):
+            publisher.send(encode(message(n)))
+        frames = [heard.next() for _ in range(20)]
+    assert [frame.frame for frame in frames] == list(range(20))
+    assert frames[0].source.startswith("zmq:127.0.0.1#")
+    assert frames[3].t_s == 3 / 120
+
+
+def test_two_senders_have_two_sources(receiver, heard, context):
+    with sender(context, receiver.address) as one, sender(context, receiver.address) as other:
+        one.send(msgpack.packb(message(1)))
+        first = heard.next()
+        other.send(msgpack.packb(message(2)))
+        assert heard.next().source != first.source
+
+
+@pytest.mark.parametrize(
+    ("send", "reason"),
+    [
+        (lambda socket: socket.send(b"garbage"), "malformed"),
+        (lambda socket: socket.send(b""), "malformed"),
+        (lambda socket: socket.send(b" " * (MAX_MESSAGE_BYTES + 1)), "oversized"),
+        (lambda socket: socket.send_multipart([b"pose", msgpack.packb(message(0))]), "malformed"),
+    ],
+)
+def test_good_frame_after_garbage(receiver, heard, counters, context, send, reason):
+    with sender(context, receiver.address) as publisher:
+        send(publisher)
+        publisher.send(msgpack.packb(message(7)))
+        assert heard.next().frame == 7
+    assert counters.snapshot()["frames_dropped"] == {reason: 1}
+    assert counters.snapshot()["frames_in"] == {"zmq": 1}
+
+
+def test_huge_message_costs_its_sender_the_connection_and_nobody_else(receiver, heard, context):
+    with sender(context, receiver.address) as good, sender(context, receiver.address) as bad:
+        bad.send(b"x" * (MAX_WIRE_BYTES + 1))
+        good.send(msgpack.packb(message(7)))
+        assert heard.next().frame == 7
+        assert bad.poll(20_000)  # it was cut off, reconnects and is subscribed to again
+        assert bad.recv() == b"\x01"
+        bad.send(msgpack.packb(message(8)))
+        assert heard.next().frame == 8
+
+
+def test_a_source_of_garbage_is_muted_and_another_is_heard(receiver, heard, counters, context):
+    with sender(context, receiver.address) as good, sender(context, receiver.address) as bad:
+        for n in range(200):
+            bad.send(b"garbage")
+            good.send(msgpack.packb(message(n)))
+        assert [heard.next().frame for _ in range(200)] == list(range(200))
+
+
+def test_sink_that_fails_does_not_end_the_stream(counters, heard, context, caplog):
+    def fussy(frame):
+        if frame.frame == 0:
+            raise RuntimeError("digest")
+        heard(frame)
+
+    receiver = ZmqBodies(fussy, counters, port=0)
+    receiver.start()
+    try:
+        with sender(context, receiver.address) as publisher:
+            publisher.send(msgpack.packb(message(0)))
+            publisher.send(msgpack.packb(message(1)))
+            assert heard.next().frame == 1
+    finally:
+        receiver.stop()
+    assert counters.snapshot()["frames_dropped"] == {"internal": 1}
+    assert "digest" in caplog.text
+
+
+def test_stop_frees_the_port_and_start_takes_it_again(heard, counters, context):
+    threads = threading.active_count()
+    port = 0
+    for n in range(3):
+        receiver = ZmqBodies(heard, counters, port=port)
+        receiver.start()
+        port = int(receiver.address.rpartition(":")[2])
+        with sender(context, receiver.address) as publisher:
+            publisher.send(msgpack.packb(message(n)))
+            assert heard.next().frame == n
+        receiver.stop()
+        receiver.stop()
+    assert threading.active_count() == threads
+
+
+def test_port_in_use_is_named(receiver, heard, counters):
+    port = int(receiver.address.rpartition(":")[2])
+    with pytest.raises(ListenError, match=rf"{port}: Address already in use; choose a free port"):
+        ZmqBodies(heard, counters, port=port).start()
+
+
+@pytest.mark.parametrize("host", ["no-such-host.invalid", "300.1.1.1", "203.0.113.5"])
+def test_wrong_host_is_named(heard, counters, host):
+    with pytest.raises(ListenError, match=host):
+        ZmqBodies(heard, counters, host=host, port=0).start()
+
+
+def test_stop_without_start(heard, counters):
+    ZmqBodies(heard, counters).stop()
+
+
+@pytest.mark.parametrize("host", ["localhost", "::1"])
+def test_other_spellings_of_loopback(heard, counters, context, host):
+    receiver = ZmqBodies(heard, counters, host=host, port=0)
+    receiver.start()
+    context.setsockopt(zmq.IPV6, 1)
+    with sender(context, receiver.address) as publisher:
+        publisher.send(msgpack.packb(message(1)))
+        assert heard.next().frame == 1
+    receiver.stop()

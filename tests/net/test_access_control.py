@@ -1,0 +1,189 @@
+"""The door of a socket: a crowd, and messages without end, cost those who are in nothing."""
+
+import select
+import socket
+import struct
+from contextlib import ExitStack
+
+import msgpack
+import pytest
+import zmq
+
+from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.net import access_control as gatekeeper
+from manipnet.net.access_control import Gatekeeper
+from manipnet.net.connection_limits import MAX_UNDELIVERED_BYTES, SMALL_TALK_BYTES, Connections
+from manipnet.net.zmq_socket import MAX_WIRE_BYTES
+from manipnet.telemetry import Counters
+
+MOST = 3
+MESSAGE = msgpack.packb({"t": 1.0, "bodies": [{"id": 1, "p": [0, 0, 0], "q": [0, 0, 0, 1]}]})
+
+
+class Door:
+    """A publisher that lets `MOST` in."""
+
+    def __init__(self) -> None:
+        self.counters, self.context = Counters(), zmq.Context()
+        self.pub = self.context.socket(zmq.XPUB)  # which tells when a subscription has come
+        self.pub.setsockopt(zmq.LINGER, 0)
+        self.pub.setsockopt(zmq.XPUB_VERBOSE, 1)
+        self.keeper = Gatekeeper(self.context, self.pub, self.counters, most=MOST)
+        self.pub.bind("tcp://127.0.0.1:0")
+        self.address = self.pub.getsockopt_string(zmq.LAST_ENDPOINT)
+
+    def refused(self) -> dict[str, int]:
+        return self.counters.snapshot().get("connections_refused", {})
+
+    def close(self) -> None:
+        self.pub.close()
+        self.context.term()
+        self.keeper.join()
+
+
+@pytest.fixture
+def door():
+    door = Door()
+    yield door
+    door.close()
+
+
+def subscribe(context, door):
+    """A subscriber that is in."""
+    sub = context.socket(zmq.SUB)
+    sub.setsockopt(zmq.LINGER, 0)
+    sub.subscribe(b"")
+    sub.connect(door.address)
+    for _ in range(2_000):
+        if door.pub.poll(10):
+            door.pub.recv()
+            return sub
+        sub.poll(0)  # one that was turned away subscribes anew only when it is used
+    pytest.fail("no subscription came")
+
+
+def knock(address: str) -> socket.socket:
+    host, _, port = address.removeprefix("tcp://").rpartition(":")
+    return socket.create_connection((host, int(port)), 20)
+
+
+def speak_zmtp(address: str, kind: bytes) -> socket.socket:
+    """A connection that has made the handshake of ZMTP 3.1 as a socket of `kind`."""
+    tcp = knock(address)
+    tcp.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x01NULL" + bytes(16) + bytes(32))
+    ready = b"\x05READY\x0bSocket-Type" + struct.pack(">I", len(kind)) + kind
+    tcp.sendall(b"\x04" + bytes([len(ready)]) + ready)
+    return tcp
+
+
+def is_turned_away(address: str) -> bool:
+    try:
+        with knock(address) as tcp:
+            return is_cut_off(tcp)
+    except ConnectionError:
+        return True
+
+
+def is_cut_off(tcp: socket.socket, while_sending: bytes = b"") -> bool:
+    """Whether the other side ends the connection, while we keep sending the same."""
+    tcp.setblocking(False)
+    rest = memoryview(while_sending)
+    try:
+        while True:
+            readable, writable, _ = select.select([tcp], [tcp] if while_sending else [], [], 20)
+            if readable and not tcp.recv(65_536):
+                return True
+            if writable:
+                rest = rest[tcp.send(rest) :] or memoryview(while_sending)
+            elif not readable:
+                return False
+    except ConnectionError:
+        return True
+
+
+def test_one_too_many_is_turned_away_counted_and_let_in_when_there_is_room(door):
+    with zmq.Context() as context, ExitStack() as crowd:
+        subs = [crowd.enter_context(subscribe(context, door)) for _ in range(MOST)]
+        assert is_turned_away(door.address)
+        assert door.refused()["too_many"] == 1
+        assert len(door.keeper.connections) == MOST
+        door.pub.send(b"news")
+        assert [sub.recv() for sub in subs] == [b"news"] * MOST
+        subs.pop().close()
+        crowd.enter_context(subscribe(context, door))
+
+
+def test_who_does_not_speak_zeromq_is_counted_and_who_does_is_not(monkeypatch):
+    monkeypatch.setattr(gatekeeper, "HANDSHAKE_MS", 200)
+    door = Door()
+    with zmq.Context() as context, subscribe(context, door), knock(door.address) as browser:
+        browser.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        for _ in range(2_000):
+            if door.refused():
+                break
+            door.pub.poll(10)
+        assert door.refused() == {"handshake": 1}
+    door.close()
+
+
+@pytest.mark.skipif(not hasattr(socket, "TCP_INFO"), reason="only Linux tells how much came over a connection")
+def test_frames_without_end_cost_a_subscriber_its_connection(door):
+    frame = b"\x03" + struct.pack(">Q", 1 << 17) + bytes(1 << 17)
+    with zmq.Context() as context, subscribe(context, door) as good, speak_zmtp(door.address, b"SUB") as bad:
+        assert is_cut_off(bad, while_sending=frame)
+        door.pub.send(b"news")
+        assert good.recv() == b"news"
+
+
+@pytest.mark.skipif(not hasattr(socket, "TCP_INFO"), reason="only Linux tells how much came over a connection")
+def test_frames_without_end_cost_a_sender_its_connection_and_others_nothing(heard, counters):
+    receiver = ZmqBodies(heard, counters, port=0)
+    receiver.start()
+    frame = b"\x03" + struct.pack(">Q", MAX_WIRE_BYTES) + bytes(MAX_WIRE_BYTES)
+    with zmq.Context() as context, context.socket(zmq.XPUB) as good, speak_zmtp(receiver.address, b"PUB") as bad:
+        good.setsockopt(zmq.LINGER, 0)
+        good.connect(receiver.address)
+        assert good.poll(20_000)
+        assert is_cut_off(bad, while_sending=frame)
+        good.send(MESSAGE)
+        assert heard.next().t_s == 1.0
+    receiver.stop()
+    assert counters.snapshot()["connections_refused"] == {"endless": 1}
+
+
+@pytest.fixture
+def pair():
+    """A connection to a port, and the port."""
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as client:
+        accepted, _ = server.accept()
+        with accepted:
+            yield client, accepted, server.getsockname()[1]
+
+
+def test_messages_that_are_read_may_come_for_ever(pair):
+    client, accepted, port = pair
+    refused: list[str] = []
+    connections = Connections(MOST, refused.append)
+    connections.listening(port)
+    connections.opened(accepted.fileno())
+    for _ in range(3 * MAX_UNDELIVERED_BYTES // 65_536):
+        client.sendall(bytes(65_536))
+        accepted.recv(65_536, socket.MSG_WAITALL)
+        connections.delivered(accepted.fileno())
+        connections.look()
+    for _ in range(100):
+        client.sendall(bytes(SMALL_TALK_BYTES))
+        connections.look()
+    assert refused == []
+
+
+def test_a_descriptor_that_is_no_longer_the_connections_is_left_alone(pair):
+    client, _, port = pair
+    refused: list[str] = []
+    connections = Connections(0, refused.append)
+    connections.listening(port)
+    with socket.create_server(("127.0.0.1", 0)) as other, open(__file__) as file:
+        for descriptor in (other.fileno(), file.fileno(), 10_000):
+            connections.opened(descriptor)
+    client.sendall(b"still there")
+    assert refused == ["too_many"] * 3

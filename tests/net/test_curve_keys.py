@@ -1,0 +1,194 @@
+"""Keys and the allow-list, through real encrypted sockets on loopback."""
+
+import stat
+import sys
+
+import msgpack
+import pytest
+import zmq
+
+from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.net.curve_keys import (
+    ALLOW_FILE,
+    SERVER_FILE,
+    ClientKeys,
+    KeyFileError,
+    KeyPair,
+    make_client_keys,
+    make_server_keys,
+    read_allow_list,
+    read_client_keys,
+    read_server_keys,
+)
+from manipnet.net.errors import ListenError
+from manipnet.net.zap import secure_client
+
+MESSAGE = msgpack.packb({"t": 1.0, "bodies": [{"id": 1, "p": [0, 0, 0], "q": [0, 0, 0, 1]}]})
+
+
+@pytest.fixture
+def folder(tmp_path):
+    make_server_keys(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def receiver(folder, heard, counters):
+    receiver = ZmqBodies(heard, counters, port=0, keys=read_server_keys(folder))
+    receiver.start()
+    yield receiver
+    receiver.stop()
+
+
+@pytest.fixture
+def connect(receiver):
+    """A publisher with the given keys, connected; it keeps sending only once it is subscribed to."""
+    context = zmq.Context()
+    made = []
+
+    def connect(keys):
+        publisher = context.socket(zmq.XPUB)
+        made.append(publisher)
+        publisher.setsockopt(zmq.LINGER, 0)
+        if keys is not None:
+            secure_client(publisher, keys)
+        publisher.connect(receiver.address)
+        return publisher
+
+    yield connect
+    for publisher in made:
+        publisher.close()
+    context.term()
+
+
+def send(publisher):
+    assert publisher.poll(20_000)
+    assert publisher.recv() == b"\x01"
+    publisher.send(MESSAGE)
+
+
+def wait_for_refusal(counters, reason):
+    """The refused client tries again and again; each try is counted. Waits on its own, bounded, without a clock."""
+    with zmq.Context() as context, context.socket(zmq.PAIR) as nothing:
+        for _ in range(2_000):
+            if counters.snapshot().get("connections_refused", {}).get(reason):
+                return
+            nothing.poll(10)
+    pytest.fail(f"nothing was counted as {reason}: {counters.snapshot()}")
+
+
+def pair():
+    public, secret = zmq.curve_keypair()
+    return KeyPair(public.decode(), secret.decode())
+
+
+def test_a_listed_client_is_heard(folder, connect, heard):
+    send(connect(read_client_keys(make_client_keys(folder, "stage-pc"))))
+    assert heard.next().t_s == 1.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "reason"),
+    [
+        (lambda folder: None, "handshake"),
+        (lambda folder: ClientKeys("x", pair(), pair().public), "handshake"),
+        (lambda folder: ClientKeys("x", pair(), read_server_keys(folder).pair.public), "not_listed"),
+    ],
+    ids=["plain", "wrong server key", "not listed"],
+)
+def test_others_are_kept_out_counted_and_harmless(folder, connect, heard, counters, keys, reason):
+    stranger = connect(keys(folder))
+    wait_for_refusal(counters, reason)
+    assert not stranger.poll(0)
+    stranger.send(MESSAGE)
+    send(connect(read_client_keys(make_client_keys(folder, "stage-pc"))))
+    heard.next()
+    assert counters.snapshot()["frames_in"] == {"zmq": 1}
+
+
+def test_a_client_taken_off_the_list_is_kept_out_from_its_next_connection_on(folder, connect, heard, counters):
+    keys = read_client_keys(make_client_keys(folder, "stage-pc"))
+    send(connect(keys))
+    heard.next()
+    (folder / ALLOW_FILE).write_text("# nobody\n")
+    connect(keys)
+    wait_for_refusal(counters, "not_listed")
+
+
+def test_a_list_that_cannot_be_read_lets_nobody_in(folder, connect, heard, counters, caplog):
+    keys = read_client_keys(make_client_keys(folder, "stage-pc"))
+    (folder / ALLOW_FILE).write_text("nonsense\n")
+    connect(keys)
+    wait_for_refusal(counters, "not_listed")
+    assert "line 1: no public key" in caplog.text
+
+
+def test_port_in_use_is_named_and_everything_is_closed(folder, receiver, heard, counters):
+    port = int(receiver.address.rpartition(":")[2])
+    with pytest.raises(ListenError, match="in use"):
+        ZmqBodies(heard, counters, port=port, keys=read_server_keys(folder)).start()
+
+
+# Key files
+
+
+def test_keys_are_made_read_and_listed(folder):
+    server = read_server_keys(folder)
+    path = make_client_keys(folder, "stage-pc")
+    client = read_client_keys(path)
+    assert client.server_public == server.pair.public
+    assert read_allow_list(folder / ALLOW_FILE) == {client.pair.public: "stage-pc"}
+    assert client.pair.secret not in repr(client)
+    assert client.pair.secret not in (folder / ALLOW_FILE).read_text()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no file modes")
+def test_secrets_can_be_read_by_their_owner_only(folder):
+    for path in (folder / SERVER_FILE, make_client_keys(folder, "a")):
+        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+def test_keys_are_never_replaced(folder):
+    with pytest.raises(KeyFileError, match="exists already"):
+        make_server_keys(folder)
+    make_client_keys(folder, "a")
+    with pytest.raises(KeyFileError, match="exists already"):
+        make_client_keys(folder, "a")
+
+
+@pytest.mark.parametrize("name", ["", "server", "../up", "a b", "x" * 65, ".hidden", "a\n"])
+def test_wrong_client_names_are_refused(folder, name):
+    with pytest.raises(KeyFileError, match="is no client name"):
+        make_client_keys(folder, name)
+
+
+def test_missing_files_say_how_to_make_them(tmp_path):
+    with pytest.raises(KeyFileError, match="manipnet keys make server"):
+        read_server_keys(tmp_path)
+    with pytest.raises(KeyFileError, match="manipnet keys make NAME"):
+        read_client_keys(tmp_path / "a.toml")
+    with pytest.raises(KeyFileError, match="cannot read"):
+        read_allow_list(tmp_path / ALLOW_FILE)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (b"", "no 'public'"),
+        (b"\xff\xfe", "cannot read"),
+        (b"public = 3", "no 'public'"),
+        (b"public = [", "cannot read"),
+        (b'public = "short"', "40 Z85"),
+    ],
+)
+def test_wrong_key_files_are_named(folder, text, says):
+    (folder / SERVER_FILE).write_bytes(text)
+    with pytest.raises(KeyFileError, match=says):
+        read_server_keys(folder)
+
+
+@pytest.mark.parametrize("line", ["short name", "é" * 40, "'" * 40 + " name"])
+def test_wrong_lines_of_the_list_are_named(folder, line):
+    (folder / ALLOW_FILE).write_text("# comment\n\n" + line + "\n", encoding="utf-8")
+    with pytest.raises(KeyFileError, match=r"line 3|cannot read"):
+        read_allow_list(folder / ALLOW_FILE)

@@ -1,0 +1,77 @@
+"""The guard against floods, with a clock that is stepped by hand."""
+
+from manipnet.net.rate_limit import FAULTS_PER_S, MAX_SOURCES, STRANGERS_PER_S, Pace, SourceGuard
+
+
+def test_a_known_source_passes_through_any_flood():
+    guard = SourceGuard()
+    assert guard.admits("good", 0.0)
+    guard.good("good")
+    admitted = sum(guard.admits(f"stranger {n}", 0.5) for n in range(50_000))
+    assert admitted == STRANGERS_PER_S - 1
+    assert guard.admits("good", 0.5)
+
+
+def test_one_loud_stranger_leaves_room_for_another():
+    guard = SourceGuard()
+    for _ in range(50_000):
+        if guard.admits("loud", 0.1):
+            guard.bad("loud")
+    assert guard.admits("new", 0.2)
+
+
+def test_the_budget_is_new_each_second():
+    guard = SourceGuard()
+    for _ in range(2 * FAULTS_PER_S):
+        if guard.admits("loud", 0.0):
+            guard.bad("loud")
+    assert not guard.admits("loud", 0.9)
+    assert guard.admits("loud", 1.0)
+
+
+def test_a_known_source_that_turns_bad_is_a_stranger_again():
+    guard = SourceGuard()
+    guard.good("relay")
+    for _ in range(FAULTS_PER_S):
+        assert guard.admits("relay", 0.0)
+        guard.bad("relay")
+    assert not guard.admits("relay", 0.0)
+    assert guard.admits("relay", 1.5)
+    guard.good("relay")
+    assert all(guard.admits("relay", 1.6) for _ in range(2 * STRANGERS_PER_S))
+
+
+def test_an_occasional_fault_is_forgiven():
+    guard = SourceGuard()
+    guard.good("relay")
+    for second in range(10 * FAULTS_PER_S):
+        assert guard.admits("relay", float(second))
+        guard.bad("relay")
+
+
+def test_memory_is_bounded():
+    guard = SourceGuard()
+    for n in range(10 * MAX_SOURCES):
+        guard.good(n)
+        guard.bad(-n)
+    assert len(guard._known) <= MAX_SOURCES
+    assert len(guard._faults) <= MAX_SOURCES
+
+
+def test_a_known_source_may_be_read_so_often_a_second_and_takes_nothing_from_others():
+    guard = SourceGuard(known_per_s=1_000)
+    for source in ("mad", "sane"):
+        guard.admits(source, 0.0)
+        guard.good(source)
+    for second in range(3):
+        assert sum(guard.admits("mad", second + n / 50_000) for n in range(50_000)) <= 1_000
+        assert all(guard.admits("sane", second + 0.9) for _ in range(360))
+
+
+def test_a_pace_lets_a_burst_through_and_then_so_many_a_second():
+    pace, now = Pace(per_s=100, burst=10), 5.0
+    assert [pace.delay_s(now) for _ in range(10)] == [0.0] * 10
+    for _ in range(200):
+        now += pace.delay_s(now)
+    assert 5.0 + 1.9 < now < 5.0 + 2.1
+    assert [pace.delay_s(now + 1.0) for _ in range(10)] == [0.0] * 10

@@ -1,0 +1,165 @@
+"""Hands out, to a crowd: who does not read, and who may not, costs the others nothing."""
+
+import itertools
+import threading
+from contextlib import ExitStack
+
+import pytest
+import zmq
+from publisher import message
+
+from manipnet.config.settings import ServerConfig, default_actor
+from manipnet.control.service import Control
+from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.net.curve_keys import (
+    ClientKeys,
+    KeyFileError,
+    KeyPair,
+    make_client_keys,
+    make_server_keys,
+    read_server_keys,
+)
+from manipnet.net.curve_keys import read_client_keys as read_keys
+from manipnet.net.zap import secure_client
+from manipnet.outputs.publisher import Publisher
+from manipnet.telemetry import Counters
+from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
+
+CONFIG = ServerConfig((default_actor(),), port=0, web_port=0)
+MOST_KEPT_BYTES = 6 << 20
+"""For a client that has stopped: `SEND_HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
+
+
+@pytest.fixture
+def context():
+    with zmq.Context() as context:
+        yield context
+
+
+@pytest.fixture
+def counters():
+    return Counters()
+
+
+@pytest.fixture
+def publisher(counters):
+    publisher = Publisher(CONFIG, counters)
+    yield publisher
+    publisher.close()
+
+
+def subscriber(context, address, topic, keys=None, **options):
+    sub = context.socket(zmq.SUB)
+    sub.setsockopt(zmq.LINGER, 0)
+    for name, value in options.items():
+        sub.setsockopt(getattr(zmq, name), value)
+    if keys is not None:
+        secure_client(sub, keys)
+    sub.subscribe(topic)
+    sub.connect(address)
+    return sub
+
+
+def publish_until_heard(publisher, subs):
+    """Subscriptions take their time: publish until everybody has one message; the next number."""
+    waiting = list(subs)
+    for seq in itertools.count():
+        publisher.publish(message(seq, seq / 60, 0.1))
+        waiting = [sub for sub in waiting if not sub.poll(10)]
+        if not waiting:
+            return seq + 1
+        assert seq < 2_000, "a subscriber hears nothing"
+    return 0
+
+
+def seq_of(sub):
+    return decode_binary(sub.recv()[len(TOPIC_BIN) :]).seq
+
+
+def test_a_subscriber_that_does_not_read_costs_the_others_nothing_and_is_bounded(publisher, context):
+    with ExitStack() as opened:
+        readers = [opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_BIN)) for _ in range(2)]
+        stopped = opened.enter_context(subscriber(context, publisher.addresses["hands"], b"", RCVHWM=1, RCVBUF=65_536))
+        seq = publish_until_heard(publisher, [*readers, stopped])
+        for sub in readers:
+            while seq_of(sub) < seq - 1:
+                pass
+        published = 0
+        while published < 3 * MOST_KEPT_BYTES:
+            both = message(seq, seq / 60, 0.1)
+            published += len(encode_binary(both)) + len(encode_msgpack(both))
+            publisher.publish(both)
+            assert [seq_of(sub) for sub in readers] == [seq] * 2
+            seq += 1
+        kept = 0
+        while stopped.poll(0):
+            kept += len(stopped.recv())
+    assert kept < MOST_KEPT_BYTES
+
+
+def pair():
+    public, secret = zmq.curve_keypair()
+    return KeyPair(public.decode(), secret.decode())
+
+
+def test_a_list_that_cannot_be_read_is_named_and_leaves_nothing_open(tmp_path):
+    make_server_keys(tmp_path)
+    keys = read_server_keys(tmp_path)
+    keys.allow_file.unlink()
+    threads = threading.active_count()
+    for start in (
+        lambda: Publisher(CONFIG, Counters(), keys),
+        lambda: Control("127.0.0.1", 0, {}, Counters(), keys),
+        ZmqBodies(print, Counters(), port=0, keys=keys).start,
+    ):
+        with pytest.raises(KeyFileError, match=r"cannot read .*clients\.allow"):
+            start()
+    assert threading.active_count() == threads
+
+
+STRANGERS = {
+    "plain": (lambda server: None, "handshake"),
+    "wrong server key": (lambda server: ClientKeys("x", pair(), pair().public), "handshake"),
+    "not listed": (lambda server: ClientKeys("x", pair(), server), "not_listed"),
+}
+
+
+@pytest.mark.parametrize(("keys", "reason"), STRANGERS.values(), ids=STRANGERS)
+def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, tmp_path, keys, reason):
+    make_server_keys(tmp_path)
+    server, friend = read_server_keys(tmp_path), read_keys(make_client_keys(tmp_path, "stage-pc"))
+    frames, hands, bodies, control = [], Counters(), Counters(), Counters()
+    with ExitStack() as opened:
+        publisher = Publisher(CONFIG, hands, server)
+        opened.callback(publisher.close)
+        receiver = ZmqBodies(frames.append, bodies, port=0, keys=server)
+        receiver.start()
+        opened.callback(receiver.stop)
+        asked = Control("127.0.0.1", 0, {"ping": lambda request: {"t": 0.0}}, control, server)
+        opened.callback(asked.stop)
+        asked.start()
+        stranger = keys(server.pair.public)
+        watching = opened.enter_context(subscriber(context, publisher.addresses["hands"], b"", stranger))
+        sending = opened.enter_context(context.socket(zmq.XPUB))
+        asking = opened.enter_context(context.socket(zmq.REQ))
+        for sock, address in ((sending, receiver.address), (asking, asked.address)):
+            sock.setsockopt(zmq.LINGER, 0)
+            if stranger is not None:
+                secure_client(sock, stranger)
+            sock.connect(address)
+        asking.send(b'{"op": "ping"}')
+        good = opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_MSGPACK, friend))
+        seq = publish_until_heard(publisher, [good])
+        for counters in (hands, bodies, control):
+            for _ in range(2_000):
+                if counters.snapshot().get("connections_refused", {}).get(reason):
+                    break
+                good.poll(10)
+                seq += 1
+                publisher.publish(message(seq, seq / 60, 0.1))
+            assert counters.snapshot()["connections_refused"][reason] >= 1
+        assert not watching.poll(0)
+        assert not sending.poll(0), "the server subscribes to a stranger"
+        assert not asking.poll(0)
+    assert "control_requests" not in control.snapshot()
+    assert frames == []

@@ -1,0 +1,126 @@
+"""VMC out: bytes against the OSC specification, poses against a T-pose thought through by hand, another reader."""
+
+import select
+import socket
+import subprocess
+import time
+
+import numpy as np
+from checkout import need
+from make_vectors import messages
+from pythonosc.osc_bundle import OscBundle
+
+from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
+from manipnet.outputs import vmc
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.skeleton import PARENTS
+from manipnet.wire import HandPose
+
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+HALF = np.sqrt(0.5)
+PLAIN = np.tile(IDENTITY, (17, 1))
+
+
+def local_rotations(angles, bent=None, by=None):
+    """Local rotations `(17, 4)` of a right hand at `angles`; the bone `bent` turned by `by` in the wrist frame."""
+    world = matrix_to_quat(forward_kinematics(angles)[1])
+    if bent is not None:
+        world[bent] = quat_multiply(by, world[bent])
+    local = world.copy()
+    local[1:] = quat_multiply(quat_conjugate(world[PARENTS[1:17]]), world[1:])
+    return local
+
+
+def hand(rotations, wrist_q=IDENTITY):
+    wrist = np.array([0.0, 1.0, 0.0, *wrist_q])
+    return HandPose("live", None, 1.0, np.zeros(20), rotations, wrist, np.tile(wrist, (26, 1)))
+
+
+def test_bytes_are_those_of_the_osc_specification():
+    assert vmc.osc_message("/oscillator/4/frequency", 440.0) == bytes.fromhex(
+        "2f6f7363696c6c61746f722f342f6672657175656e6379002c66000043dc0000"
+    )
+    assert vmc.osc_message("/foo", 1000, -1, "hello", 1.234, 5.678) == bytes.fromhex(
+        "2f666f6f000000002c69697366660000000003e8ffffffff68656c6c6f0000003f9df3b640b5b22d"
+    )
+
+
+def test_a_bundle_fits_a_packet_and_says_what_the_specification_asks():
+    bundle = vmc.hand_bundle("right", messages()["live"].hands["right"], 1.5, PLAIN)
+    assert len(bundle) + 28 <= 1500
+    assert bundle[:16] == b"#bundle\0" + bytes(7) + b"\x01"
+    assert bundle[20:40] == b"/VMC/Ext/OK\0,i\0\0" + b"\0\0\0\x01"
+    assert bundle[44:64] == b"/VMC/Ext/T\0\0,f\0\0" + b"\x3f\xc0\0\0"
+    assert bundle[68:100] == b"/VMC/Ext/Bone/Pos\0\0\0,sfffffff\0\0\0"
+    names = [m.params[0] for m in OscBundle(bundle) if m.address == "/VMC/Ext/Bone/Pos"]
+    assert len(set(names)) == 16
+    assert {"RightHand", "RightThumbProximal", "RightLittleDistal"} <= set(names)
+
+
+def test_angle_zero_is_the_t_pose_without_correction():
+    poses = vmc.bone_poses("right", hand(local_rotations(np.zeros(20))), PLAIN)
+    turned = [name for name, pose in poses.items() if abs(pose[3:] @ IDENTITY) < 1 - 1e-6]
+    assert turned == ["RightHand"]  # this wrist is not in T-pose
+
+
+def test_a_finger_bent_by_a_right_angle():
+    """T-pose, palm down, Unity: a right finger points to +x and curls to -y, a left one to -x and curls to -y."""
+    bent = local_rotations(np.zeros(20), bent=6, by=quat_exp(np.array([0.0, np.pi / 2, 0.0])))
+    right = vmc.bone_poses("right", hand(bent), PLAIN)
+    left = vmc.bone_poses("left", hand(mirror_quats(bent)), PLAIN)
+    np.testing.assert_allclose(right["RightIndexIntermediate"][3:], [0, 0, -HALF, HALF], atol=1e-4)
+    np.testing.assert_allclose(left["LeftIndexIntermediate"][3:], [0, 0, HALF, HALF], atol=1e-4)
+    np.testing.assert_allclose(right["RightIndexProximal"][3:], IDENTITY, atol=1e-4)
+    assert right["RightIndexIntermediate"][0] > 0 > left["LeftIndexIntermediate"][0]
+
+
+def test_wrists_in_t_pose_do_not_turn_the_hand():
+    """A right wrist with fingers to -x, thumb to +z, back up in the project frame is the T-pose itself."""
+    t_pose = matrix_to_quat(np.array([[-1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]]))
+    flat = local_rotations(np.zeros(20))
+    right = vmc.bone_poses("right", hand(flat, t_pose), PLAIN)["RightHand"]
+    left = vmc.bone_poses("left", hand(mirror_quats(flat), mirror_quats(t_pose)), PLAIN)["LeftHand"]
+    np.testing.assert_allclose(right, [vmc.FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(left, [-vmc.FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
+
+
+def test_rest_pose_correction_makes_bones_point_where_the_hand_does():
+    angles = np.linspace(0.0, 0.9, 20)
+    positions, _ = forward_kinematics(angles)
+    sender = vmc.VmcSender("127.0.0.1", 9)
+    correction = sender._correction
+    sender.close()
+    poses = vmc.bone_poses("right", hand(local_rotations(angles)), correction)
+    for finger, joints in (("Thumb", (2, 3, 4, 17)), ("Little", (14, 15, 16, 21))):
+        turn = IDENTITY
+        straight = [HALF, 0.0, HALF] if finger == "Thumb" else [1.0, 0.0, 0.0]  # Unity: thumbs 45 degrees to the front
+        for part, start, end in zip(("Proximal", "Intermediate", "Distal"), joints[:-1], joints[1:], strict=True):
+            turn = quat_multiply(turn, poses[f"Right{finger}{part}"][3:])
+            x, y, z = (positions[end] - positions[start]) / np.linalg.norm(positions[end] - positions[start])
+            np.testing.assert_allclose(quat_rotate(turn, np.array(straight)), [x, z, y], atol=1e-6)
+
+
+def test_read_by_an_independent_osc_tool():
+    (oscdump,) = need("oscdump")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    process = subprocess.Popen([oscdump, "-L", str(port)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    sender, message = vmc.VmcSender("127.0.0.1", port), messages()["live"]
+    try:
+        text, give_up = b"", time.monotonic() + 20
+        while text.count(b"/VMC/Ext/Bone/Pos") < 32 and time.monotonic() < give_up:
+            sender.send(message)  # again and again: the tool does not tell when it listens
+            while select.select([process.stdout], [], [], 0.05)[0]:
+                text += process.stdout.read1(65536)
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        sender.close()
+    lines = [line.split() for line in text.decode().splitlines()]
+    expected = vmc.bone_poses("right", message.hands["right"], vmc._rest_pose_correction())["RightIndexProximal"]
+    row = next(line for line in lines if '"RightIndexProximal"' in line)
+    assert row[1:3] == ["/VMC/Ext/Bone/Pos", "sfffffff"]
+    np.testing.assert_allclose([float(x) for x in row[4:]], expected, atol=1e-5)
+    assert ["/VMC/Ext/OK", "i", "1"] in [line[1:4] for line in lines]

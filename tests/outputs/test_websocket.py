@@ -1,0 +1,108 @@
+"""Hands over WebSocket: every payload, the newest for slow readers, no other site's pages."""
+
+import socket
+from contextlib import ExitStack
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from manipnet.outputs.websocket import MAX_CLIENTS, MAX_REQUESTS, WebSocketPublisher
+from manipnet.telemetry import Counters
+
+
+@pytest.fixture
+def counters():
+    return Counters()
+
+
+@pytest.fixture
+def publisher(counters):
+    publisher = WebSocketPublisher("127.0.0.1", 0, counters)
+    yield publisher
+    publisher.stop()
+
+
+def receive(publisher, connection, payload):
+    """Publish until the client, whose joining nobody announces, has it."""
+    while True:
+        publisher.publish(payload)
+        try:
+            return connection.recv(timeout=0.1)
+        except TimeoutError:
+            continue
+
+
+def test_payloads_arrive_in_order(publisher):
+    with connect(publisher.address) as connection:
+        assert receive(publisher, connection, b"0") == b"0"
+        for payload in (b"1", b"2", b"3"):
+            publisher.publish(payload)
+            while (got := connection.recv(timeout=10)) == b"0":
+                pass
+            assert got == payload
+
+
+def test_a_slow_client_gets_the_newest(publisher):
+    with connect(publisher.address, max_queue=1) as connection:
+        receive(publisher, connection, b"start")
+        for i in range(3000):
+            publisher.publish(i.to_bytes(4, "big") * 1000)
+        seen = []
+        while not seen or seen[-1] < 2999:
+            payload = connection.recv(timeout=10)
+            if payload != b"start":
+                seen.append(int.from_bytes(payload[:4], "big"))
+    assert seen == sorted(set(seen))
+    assert len(seen) < 3000
+
+
+@pytest.mark.parametrize("origin", ["http://localhost:8000", "http://127.0.0.1", "https://[::1]:8443"])
+def test_local_pages_may_connect(publisher, origin):
+    with connect(publisher.address, origin=origin) as connection:
+        assert receive(publisher, connection, b"x") == b"x"
+
+
+@pytest.mark.parametrize("origin", ["https://example.com", "null", "http://localhost.example.com"])
+def test_other_pages_may_not(publisher, origin):
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(publisher.address, origin=origin)
+
+
+def test_a_crowd_is_bounded_and_counted(publisher, counters):
+    with ExitStack() as crowd:
+        for _ in range(MAX_CLIENTS):
+            receive(publisher, crowd.enter_context(connect(publisher.address, max_queue=None)), b"x")
+        with connect(publisher.address) as late, pytest.raises(ConnectionClosed, match="at most 32 clients"):
+            late.recv(timeout=10)
+        assert publisher.client_count == MAX_CLIENTS
+    assert counters.snapshot() == {"connections_refused": {"too_many": 1}}
+
+
+def test_a_chatterbox_is_cut_off(publisher, counters):
+    with connect(publisher.address) as connection:
+        connection.send(b"x" * 2000)
+        with pytest.raises(ConnectionClosed, match="1009"):
+            connection.recv(timeout=10)
+    with connect(publisher.address) as connection:
+        for _ in range(MAX_REQUESTS):
+            connection.send(b"x")
+        with pytest.raises(ConnectionClosed, match="nothing is to be said"):
+            connection.recv(timeout=10)
+    assert counters.snapshot() == {"connections_refused": {"endless": 1}}
+
+
+def test_a_port_in_use_is_an_error(publisher):
+    port = int(publisher.address.rpartition(":")[2])
+    with pytest.raises(OSError, match="in use"):
+        WebSocketPublisher("127.0.0.1", port, Counters())
+
+
+def test_stop_twice_and_publish_after():
+    publisher = WebSocketPublisher("127.0.0.1", 0, Counters())
+    publisher.stop()
+    publisher.stop()
+    publisher.publish(b"nobody hears this")
+    host, port = publisher.address.removeprefix("ws://").split(":")
+    with pytest.raises(OSError):
+        socket.create_connection((host, int(port)), 5)

@@ -1,0 +1,245 @@
+"""Objects from files: a folder of the user's own, files that change while a session runs, swaps between two ticks."""
+
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from manipnet.actors.actor import Actor
+from manipnet.actors.props import HYSTERESIS_M, Prop
+from manipnet.config.settings import BodyConfig, ObjectConfig, default_actor
+from manipnet.runtime import shape_process as workshop
+from manipnet.runtime.mesh_watch import MeshWatch
+from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.shape_process import make_shape
+from manipnet.synthesis.model.bundle import Bundle, load_bundle
+from manipnet.synthesis.objects.library import library_names
+from manipnet.synthesis.objects.mesh import MeshError
+from manipnet.telemetry import Counters
+from manipnet.wire.bodies import BodyFrame, BodySample
+
+LIBRARY = {
+    *("cube", "cylinder", "sphere", "torus", "prism", "tetrahedron", "hemisphere"),
+    *("mug", "bottle", "bowl", "hammer", "wine_glass"),
+}
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MANIPNET_CACHE", str(tmp_path_factory.mktemp("cache")))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "meshes").mkdir()
+    return tmp_path / "meshes"
+
+
+def box(path: Path, size_m: float) -> None:
+    trimesh.creation.box((size_m, size_m, size_m)).export(path)
+    # a clock that is too coarse must not hide the change
+    stat = path.stat()
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + round(1e9 * size_m)))
+
+
+def size_of(shape) -> float:
+    return float(np.ptp(shape.bounds, axis=0)[0])
+
+
+def test_the_library_is_complete() -> None:
+    assert set(library_names()) == LIBRARY
+
+
+def test_a_folder_adds_to_the_library_and_comes_before_it(folder: Path) -> None:
+    wardrobe = Wardrobe(folder, "cm")
+    assert set(wardrobe.names()) == LIBRARY
+    box(folder / "crate.stl", 7.0)
+    box(folder / "cube.obj", 9.0)
+    (folder / "notes.txt").write_text("no mesh")
+    assert set(wardrobe.names()) == LIBRARY | {"crate"}, "without being told"
+    assert size_of(wardrobe.shape("crate")) == pytest.approx(0.07, abs=1e-6)
+    assert size_of(wardrobe.shape("cube")) == pytest.approx(0.09, abs=1e-6)
+    assert wardrobe.shape("crate") is wardrobe.shape("crate"), "built once"
+    with pytest.raises(MeshError, match="no object 'spoon'; there are bottle, bowl, crate, cube"):
+        wardrobe.shape("spoon")
+
+
+def test_a_rigs_mesh_comes_before_the_folders(folder: Path, tmp_path: Path) -> None:
+    box(folder / "crate.stl", 0.05)
+    box(tmp_path / "crate.stl", 0.08)
+    wardrobe = Wardrobe(folder)
+    prop = wardrobe.load(ObjectConfig("Box", BodyConfig("Box"), tmp_path / "crate.stl"))
+    assert wardrobe.shape("crate") is prop.shape
+    assert wardrobe.add(folder / "crate.stl") is wardrobe.shape("crate"), "what is brought in comes first"
+
+
+def test_a_changed_file_is_built_again_once_nobody_writes_it_any_more(folder: Path) -> None:
+    path = folder / "crate.ply"
+    box(path, 0.05)
+    wardrobe = Wardrobe(folder)
+    old = wardrobe.shape("crate")
+    assert wardrobe.changed() == []
+    box(path, 0.06)
+    assert wardrobe.changed() == [], "it may still be being written"
+    box(path, 0.07)
+    assert wardrobe.changed() == [], "it was"
+    ((before, after),) = wardrobe.changed()
+    assert before is old
+    assert size_of(after) == pytest.approx(0.07, abs=1e-6)
+    assert wardrobe.shape("crate") is after
+    assert wardrobe.changed() == []
+    path.touch()
+    assert (wardrobe.changed(), wardrobe.changed()) == ([], []), "the same content is no change"
+    path.unlink()
+    assert (wardrobe.changed(), wardrobe.changed()) == ([], [])
+    assert "crate" not in wardrobe.names()
+
+
+@pytest.mark.parametrize("content", [b"", b"ply\nnonsense", b"solid x\nendsolid x\n"])
+def test_a_file_that_breaks_is_named_and_the_shape_stays(folder: Path, content: bytes, caplog) -> None:
+    path = folder / "crate.ply"
+    box(path, 0.05)
+    wardrobe = Wardrobe(folder)
+    old = wardrobe.shape("crate")
+    path.write_bytes(content)
+    assert (wardrobe.changed(), wardrobe.changed()) == ([], [])
+    assert wardrobe.shape("crate") is old
+    assert str(path) in wardrobe.problems()["crate.ply"]
+    assert "a mesh file has changed, but is not used" in caplog.text
+    box(path, 0.06)
+    wardrobe.changed()
+    assert len(wardrobe.changed()) == 1
+    assert wardrobe.problems() == {}
+
+
+def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
+    path, done, tries = folder / "crate.ply", threading.Event(), []
+    box(path, 0.05)
+    wardrobe = Wardrobe(folder)
+    wardrobe.shape("crate")
+
+    def swap(old, new) -> None:
+        tries.append((old, new))
+        if len(tries) < 2:
+            raise RuntimeError("busy")
+        done.set()
+
+    watch = MeshWatch(wardrobe, swap)
+    box(path, 0.06)
+    watch.start()
+    assert done.wait(60.0)
+    watch.stop()
+    assert len(tries) == 2
+
+
+def test_a_large_file_is_prepared_by_another_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = folder / "crate.ply"
+    box(path, 0.05)
+    here = make_shape(path, "m", 2.0)
+    monkeypatch.setattr(workshop, "LARGE_BYTES", 0)
+    there = make_shape(path, "m", 2.0)
+    assert (there.name, there.content_hash) == (here.name, here.content_hash)
+    np.testing.assert_array_equal(there.mesh.vertices, here.mesh.vertices)
+    np.testing.assert_array_equal(there.mesh.faces, here.mesh.faces)
+    path.write_bytes(b"ply, they said")
+    with pytest.raises(MeshError, match=r"crate\.ply: "):
+        make_shape(path, "m", 1.0)
+
+
+# --- what a hand makes of it
+
+
+@pytest.fixture(scope="module")
+def bundle(tiny_bundle: Path) -> Bundle:
+    return load_bundle(tiny_bundle)
+
+
+class Scene:
+    """An actor with two props, seen tick by tick."""
+
+    def __init__(self, bundle: Bundle, wardrobe: Wardrobe) -> None:
+        shape = wardrobe.shape("cube")
+        self.actor = Actor(
+            default_actor(), [Prop("cup", "cube", shape), Prop("pot", "cube", shape)], bundle, Counters(), 0.0
+        )
+        for prop in self.actor.props:
+            self.actor.carry(prop.name, prop.object, prop.shape, 1.0)
+        self._frames = 0
+
+    def tick(self, left: float, right: float, cup: float = -0.2, pot: float = 0.2):
+        """The plan of the next tick, with everything at these places along x."""
+        places = {"left_wrist": left, "right_wrist": right, "cup": cup, "pot": pot}
+        bodies = tuple(BodySample(None, name, (x, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True) for name, x in places.items())
+        t_s = self._frames / 60
+        self._frames += 1
+        self.actor.push(BodyFrame(t_s, None, bodies, t_s, "zmq:test"))
+        tick = self.actor.timeline.poll(t_s)
+        assert tick is not None
+        return self.actor.plan(tick)
+
+    def held(self) -> dict[str, str | None]:
+        return {side: hand.prop for side, hand in self.actor.hands.items()}
+
+
+def test_two_objects_one_in_each_hand_at_the_same_time(bundle: Bundle) -> None:
+    wardrobe = Wardrobe()
+    scene = Scene(bundle, wardrobe)
+    scene.actor.carry("pot", "sphere", wardrobe.shape("sphere"), 1.5)
+    plan = scene.tick(left=-0.12, right=0.12)
+    assert scene.held() == {"left": "cup", "right": "pot"}
+    assert (plan.scenes["left"].shape.name, plan.scenes["left"].scale) == ("cube", 1.0)
+    assert (plan.scenes["right"].shape.name, plan.scenes["right"].scale) == ("sphere", 1.5)
+
+
+def test_a_hand_turns_to_another_object_only_when_it_is_clearly_nearer(bundle: Bundle) -> None:
+    scene = Scene(bundle, Wardrobe())
+    palm = 0.09  # in front of a right wrist
+    scene.tick(left=-1.0, right=-0.03 - palm)
+    assert scene.held()["right"] == "cup"
+    seen = []
+    for step in np.linspace(0.0, 0.04, 41):
+        scene.tick(left=-1.0, right=-palm + step)
+        seen.append(scene.held()["right"])
+    first = seen.index("pot")
+    assert 2.0 * np.linspace(0.0, 0.04, 41)[first] == pytest.approx(HYSTERESIS_M, abs=0.003)
+    for step in (0.005, -0.005) * 10:  # back about the middle: it stays
+        scene.tick(left=-1.0, right=-palm + step)
+        assert scene.held()["right"] == "pot"
+
+
+def test_a_swapped_or_changed_shape_is_in_the_very_next_tick(bundle: Bundle, folder: Path) -> None:
+    path = folder / "crate.ply"
+    box(path, 0.05)
+    wardrobe = Wardrobe(folder)
+    scene = Scene(bundle, wardrobe)
+    assert scene.tick(-0.3, 0.1).scenes["right"].shape.name == "cube"
+    crate = wardrobe.shape("crate")
+    scene.actor.carry("pot", "crate", crate, 1.0)
+    assert scene.tick(-0.3, 0.1).scenes["right"].shape is crate
+    box(path, 0.06)
+    watch = MeshWatch(wardrobe, scene.actor.reshape)
+    watch.look()
+    watch.look()
+    plan = scene.tick(-0.3, 0.1)
+    assert size_of(plan.scenes["right"].shape) == pytest.approx(0.06, abs=1e-6)
+    assert plan.scenes["left"].shape.name == "cube", "nothing else changes"
+
+
+def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> None:
+    """No tick waits for a builder: it asks for nothing that a builder holds."""
+    box(folder / "crate.ply", 0.05)
+    wardrobe = Wardrobe(folder)
+    scene = Scene(bundle, wardrobe)
+    with wardrobe._building:  # as if a huge mesh were being built
+        builder = threading.Thread(target=wardrobe.shape, args=("crate",))
+        builder.start()
+        for _ in range(30):
+            assert "right" in scene.tick(-0.3, 0.1).scenes
+        assert wardrobe.names()
+        assert wardrobe.problems() == {}
+        assert builder.is_alive()
+    builder.join()
+    assert "crate" in {shape.name for shape in wardrobe.shapes()}

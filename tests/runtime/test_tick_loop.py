@@ -1,0 +1,243 @@
+"""The loop without sockets: two props, two actors, and what happens when something inside it breaks."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_server import scene
+
+from manipnet.actors.actor import Actor
+from manipnet.actors.props import Prop
+from manipnet.config.settings import WRISTS, ActorConfig, BodyConfig, ObjectConfig, default_actor
+from manipnet.geometry import quat_exp
+from manipnet.runtime.flight_recorder import FlightRecorder
+from manipnet.runtime.mailbox import Mailbox
+from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.tick_loop import TickLoop
+from manipnet.synthesis.model.bundle import Bundle, load_bundle
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+from manipnet.synthesis.synthesizer import HandStep, Synthesizer
+from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.wire import HandsMessage, encode_msgpack
+from manipnet.wire.bodies import BodyFrame, BodySample
+
+HERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def bundle(tiny_bundle: Path) -> Bundle:
+    return load_bundle(tiny_bundle)
+
+
+@pytest.fixture(scope="module")
+def wardrobe() -> Wardrobe:
+    return Wardrobe()
+
+
+class Bench:
+    """A loop whose time is the frames' own, and what it publishes."""
+
+    def __init__(self, bundle: Bundle, folder: Path, actors: list[Actor], counters: Counters, synthesizer=None) -> None:
+        self.messages: list[HandsMessage] = []
+        self.counters, self.mailbox, self.actors = counters, Mailbox(counters), actors
+        timings = Timings()
+        stages = StageClock(timings)
+        self.loop = TickLoop(
+            "session",
+            actors,
+            synthesizer or Synthesizer(bundle, on_stage=stages.ended),
+            stages,
+            self._publish,
+            self.mailbox,
+            FlightRecorder(folder),
+            counters,
+            timings,
+        )
+
+    def play(self, seconds: float, poses=scene, rate_hz: float = 120.0, start_s: float = 0.0) -> list[HandsMessage]:
+        first = len(self.messages)
+        for i in range(round(seconds * rate_hz)):
+            t_s = start_s + i / rate_hz
+            self.mailbox.put(frame(t_s, poses(t_s)))
+            self.loop.take_in(0.0)
+            while self.loop.step(t_s):
+                pass
+        return self.messages[first:]
+
+    def _publish(self, message: HandsMessage) -> None:
+        encode_msgpack(message)  # which refuses what must not leave
+        self.messages.append(message)
+
+
+def frame(t_s: float, poses) -> BodyFrame:
+    bodies = tuple(
+        BodySample(
+            key if isinstance(key, int) else None,
+            key if isinstance(key, str) else None,
+            tuple((pose or HERE)[:3]),
+            tuple((pose or HERE)[3:]),
+            pose is not None,
+        )
+        for key, pose in poses.items()
+    )
+    return BodyFrame(t_s, None, bodies, t_s, "zmq:bench")
+
+
+def actor(bundle: Bundle, wardrobe: Wardrobe, counters: Counters, *props: Prop, config=None) -> Actor:
+    made = Actor(config or default_actor(), props, bundle, counters, 0.5)
+    for prop in props:
+        made.carry(prop.name, prop.object, prop.shape, prop.scale)
+    return made
+
+
+@pytest.fixture
+def bench(bundle: Bundle, wardrobe: Wardrobe, tmp_path: Path):
+    counters = Counters()
+    return Bench(
+        bundle, tmp_path, [actor(bundle, wardrobe, counters, Prop("Box", "cube", wardrobe.shape("cube")))], counters
+    )
+
+
+def test_each_hand_takes_the_prop_that_is_nearest_and_does_not_waver(bundle, wardrobe, tmp_path) -> None:
+    counters = Counters()
+    props = [Prop(name, "cube", wardrobe.shape("cube")) for name in ("cup", "pot")]
+    bench = Bench(bundle, tmp_path, [actor(bundle, wardrobe, counters, *props)], counters)
+
+    def poses(t_s: float):
+        wobble = 0.01 * np.sin(40.0 * t_s)  # two props, each hand near one of them, the left one in the middle
+        return {
+            "left_wrist": (0.09 + wobble, 0.0, 0.03, 0.0, 0.0, 0.0, 1.0),
+            "right_wrist": (0.3, 0.0, 0.03, 0.0, 0.0, 0.0, 1.0),
+            "cup": (-0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+            "pot": (0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+        }
+
+    messages = bench.play(1.5, poses)
+    assert {message.hands["right"].object for message in messages} == {"pot"}
+    assert len({message.hands["left"].object for message in messages}) == 1
+
+
+def test_two_actors_are_told_apart_and_share_one_stream(bundle, wardrobe, tmp_path) -> None:
+    counters = Counters()
+    ann = ActorConfig("ann", {"left_wrist": BodyConfig(1), "right_wrist": BodyConfig("2")})
+    bob = ActorConfig("bob", {"right_wrist": BodyConfig("bob")}, hand_scale=0.8)
+    bench = Bench(
+        bundle,
+        tmp_path,
+        [
+            actor(bundle, wardrobe, counters, Prop("box", "cube", wardrobe.shape("cube")), config=ann),
+            actor(bundle, wardrobe, counters, Prop("ball", "sphere", wardrobe.shape("sphere")), config=bob),
+        ],
+        counters,
+    )
+    poses = lambda t: {  # noqa: E731
+        1: scene(t)["left_wrist"],
+        2: scene(t)["right_wrist"],
+        "box": scene(t)["Box"],
+        "bob": (1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+        "ball": (1.1, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+    }
+    messages = bench.play(1.0, poses)
+    for name, sides, held in (("ann", {"left", "right"}, "box"), ("bob", {"right"}, "ball")):
+        own = [message for message in messages if message.actor == name]
+        assert [message.seq for message in own] == list(range(len(own)))
+        assert len(own) == 30
+        assert {frozenset(message.hands) for message in own} == {frozenset(sides)}
+        assert {hand.object for message in own for hand in message.hands.values()} == {held}
+    bobs = messages[-1].hands["right"]
+    assert bobs.scale == 0.8
+    knuckles = np.linalg.norm(bobs.joints[12, :3] - bobs.joints[1, :3])
+    anns = next(m for m in reversed(messages) if m.actor == "ann").hands["right"]
+    assert knuckles == pytest.approx(0.8 * np.linalg.norm(anns.joints[12, :3] - anns.joints[1, :3]))
+
+
+def test_a_body_with_an_offset_is_where_the_offset_says(bundle, wardrobe, tmp_path) -> None:
+    turn = quat_exp(np.array([0.0, np.pi / 2, 0.0]))
+    config = ActorConfig("a", {"right_wrist": BodyConfig(3, np.array([0.0, 0.0, 0.1, *turn]))})
+    counters = Counters()
+    bench = Bench(bundle, tmp_path, [actor(bundle, wardrobe, counters, config=config)], counters)
+    (wrist,) = {tuple(m.hands["right"].wrist.round(6)) for m in bench.play(0.6, lambda _: {3: HERE})}
+    assert wrist == pytest.approx((0.0, 0.0, 0.1, *turn), abs=1e-6)
+
+
+class Faulty:
+    """A synthesizer that breaks at chosen calls, by raising or by returning NaN."""
+
+    def __init__(self, bundle: Bundle, breaks, how: str) -> None:
+        self._inner, self._breaks, self._how, self.calls = Synthesizer(bundle), breaks, how, 0
+
+    def step(self, scenes, states) -> list[HandStep]:
+        self.calls += bool(scenes)
+        steps = self._inner.step(scenes, states)
+        if self.calls in self._breaks and scenes:
+            if self._how == "raise":
+                raise RuntimeError("the network is on fire")
+            for step in steps:
+                step.angles[3] = step.state.angles[3] = np.nan
+        return steps
+
+
+@pytest.mark.parametrize("how", ["raise", "nan"])
+def test_an_internal_error_shows_the_last_good_pose_leaves_a_dump_and_goes_on(
+    bundle, wardrobe, tmp_path: Path, how: str
+) -> None:
+    counters = Counters()
+    actors = [actor(bundle, wardrobe, counters, Prop("Box", "cube", wardrobe.shape("cube")))]
+    bench = Bench(bundle, tmp_path, actors, counters, Faulty(bundle, {20, 21, 22}, how))
+    messages = bench.play(1.5)
+    assert [message.seq for message in messages] == list(range(60))
+    states = [message.hands["left"].state for message in messages]
+    assert [i for i, state in enumerate(states) if state == "hold"] == [19, 20, 21]
+    assert set(states) == {"live", "hold"}
+    held = [message.hands["left"].angles for message in messages[18:22]]
+    assert all(np.array_equal(held[0], angles) for angles in held)
+    assert sum(counters.snapshot()["tick_errors"].values()) == 3
+    bench.loop._recorder.finish()
+    (dump,) = tmp_path.glob("manipnet-*.json")
+    content = json.loads(dump.read_text())
+    assert content["error"]
+    assert len(content["frames"]) > 60
+    assert "left_wrist" in content["ticks"][0]["bodies"]
+
+
+def test_an_error_in_one_actors_plan_holds_that_actor_only(bench: Bench, monkeypatch) -> None:
+    bench.play(0.8)
+    monkeypatch.setattr(bench.actors[0], "plan", lambda tick: 1 / 0)
+    held = bench.play(0.2, start_s=0.8)
+    monkeypatch.undo()
+    after = bench.play(0.4, start_s=1.0)
+    assert {hand.state for message in held for hand in message.hands.values()} == {"hold"}
+    assert after[-1].hands["left"].state == "live"
+    assert bench.counters.snapshot()["tick_errors"]["plan"] == len(held)
+
+
+def test_a_message_that_cannot_be_published_is_counted_and_the_next_one_goes_out(bench: Bench, monkeypatch) -> None:
+    monkeypatch.setattr(bench, "messages", None)  # nothing can be appended
+    bench.loop._publish = lambda message: 1 / 0
+    bench.mailbox.put(frame(0.0, scene(0.0)))
+    monkeypatch.undo()
+    assert bench.play(0.6) == []
+    assert bench.counters.snapshot()["tick_errors"]["publish"] > 3
+
+
+def test_a_hand_smaller_than_the_models_sees_a_larger_world(bundle, wardrobe) -> None:
+    config = ActorConfig("child", {wrist: BodyConfig(wrist) for wrist in WRISTS}, hand_scale=0.5)
+    counters = Counters()
+    child = actor(bundle, wardrobe, counters, Prop("Box", "cube", wardrobe.shape("cube"), 0.7), config=config)
+    for i in range(70):
+        child.push(frame(i / 120, scene(i / 120)))
+    tick = child.timeline.poll(1.0)
+    assert tick is not None
+    seen = child.plan(tick).scenes["left"]
+    assert seen.scale == pytest.approx(1.4)
+    assert np.allclose(seen.wrist[:, :3], 2.0 * tick.bodies["left_wrist"].window[:, :3])
+    assert np.allclose(seen.wrist[:, 3:], tick.bodies["left_wrist"].window[:, 3:])
+
+
+def test_the_same_mesh_is_built_once() -> None:
+    wardrobe = Wardrobe()
+    cube = LIBRARY_FOLDER / "cube.ply"
+    one, other = (wardrobe.load(ObjectConfig(name, BodyConfig(name), cube)) for name in ("one", "other"))
+    assert one.shape is other.shape
+    assert (one.name, other.name, other.object) == ("one", "other", "cube")

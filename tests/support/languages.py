@@ -1,0 +1,114 @@
+"""The engine-free clients of other languages, each as a command that speaks the harness's text protocol."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from checkout import CLIENTS, ROOT, need
+
+HARNESSES = ROOT / "tests" / "clients"
+CSHARP = CLIENTS / "unity" / "com.manipnet.client" / "Runtime" / "Core"
+CPP = CLIENTS / "unreal" / "ManipNetLiveLink" / "Source" / "ManipNetLiveLink" / "Private" / "Core"
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror")
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+NAMES = ("csharp", "gcc-sanitized", "gcc-threads", "clang", "javascript", "python")
+"""The C++ is built thrice: with gcc and its address and undefined-behaviour sanitizers, with gcc and its thread
+sanitizer, and optimised with clang."""
+
+SMALL_NURSERY = {"MONO_GC_PARAMS": "nursery-size=64k"}
+"""Mono then collects after 64 kB: no collection in n frames means less than 64 kB / n for each."""
+
+
+def build(name: str, folder: Path) -> list[str]:
+    """The command that runs a client's harness; skips the test where its tools are missing."""
+    builders = {
+        "csharp": _csharp,
+        "gcc-sanitized": lambda folder: _gcc(folder, *SANITIZERS),
+        "gcc-threads": lambda folder: _gcc(folder, "-fsanitize=thread"),
+        "clang": _clang,
+        "javascript": _javascript,
+        "python": lambda _: [sys.executable, str(HARNESSES / "python_harness.py")],
+    }
+    return builders[name](folder)
+
+
+def _csharp(folder: Path) -> list[str]:
+    mcs, mono = need("mcs", "mono")
+    exe = folder / "harness.exe"
+    sources = [*sorted(CSHARP.glob("*.cs")), HARNESSES / "csharp" / "Harness.cs"]
+    options = ["-langversion:7.2", "-warn:4", "-warnaserror", "-optimize", "-r:System.Core", f"-out:{exe}"]
+    subprocess.run([mcs, *options, *map(str, sources)], check=True)
+    return [mono, str(exe)]
+
+
+def _gcc(folder: Path, *sanitizers: str) -> list[str]:
+    return _cpp(need("g++")[0], folder / "gcc", "-g", *sanitizers)
+
+
+def _clang(folder: Path) -> list[str]:
+    return _cpp(need("clang++")[0], folder / "clang", "-O2")
+
+
+def _cpp(compiler: str, exe: Path, *options: str) -> list[str]:
+    sources = [*sorted(CPP.glob("*.cpp")), HARNESSES / "cpp" / "harness.cpp"]
+    common = ["-std=c++17", *WARNINGS, "-pthread", f"-I{CPP}", *options, "-o", str(exe)]
+    subprocess.run([compiler, *common, *map(str, sources)], check=True)
+    return [str(exe)]
+
+
+def _javascript(_: Path) -> list[str]:
+    (node,) = need("node")
+    # Before version 22 node's own WebSocket has to be asked for.
+    options = ["--no-warnings", "--experimental-websocket", "--expose-gc", "--max-semi-space-size=64"]
+    return [node, *options, str(HARNESSES / "web" / "harness.mjs")]
+
+
+def run(command: list[str], *words: str, text: str = "") -> list[str]:
+    """Lines a harness prints."""
+    done = subprocess.run([*command, *words], input=text, capture_output=True, encoding="utf-8", timeout=120)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+@dataclass
+class LiveClient:
+    """A harness connected to a server: every question gets a line of figures."""
+
+    process: subprocess.Popen
+
+    @classmethod
+    def start(cls, command: list[str], address: str, verb: str = "live") -> "LiveClient":
+        """Run the harness's `live` or `idle`."""
+        pipe, environment = subprocess.PIPE, {**os.environ, **SMALL_NURSERY}
+        words = [*command, verb, address]
+        return cls(subprocess.Popen(words, stdin=pipe, stdout=pipe, encoding="utf-8", env=environment))
+
+    def ask(self, what: str = "") -> Any:
+        """The client's figures as of now, or its "arrivals": number and time of every frame since they were told."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(f"{what}\n")
+        self.process.stdin.flush()
+        return json.loads(self.process.stdout.readline())
+
+    def ask_until(self, condition, limit_s: float = 30.0) -> dict:
+        """Ask until the figures meet a condition."""
+        give_up = time.monotonic() + limit_s
+        while not condition(figures := self.ask()):
+            assert time.monotonic() < give_up, figures
+        return figures
+
+    def close(self) -> tuple[str, int]:
+        """End it by the end of its input; its last words and its exit status."""
+        rest, _ = self.process.communicate(timeout=30)
+        return rest.strip(), self.process.returncode
+
+    def kill(self) -> None:
+        """Whatever state it is in."""
+        self.process.kill()
+        self.process.communicate()

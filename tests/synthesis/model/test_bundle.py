@@ -1,0 +1,47 @@
+"""Where a network runs: a GPU that cannot be had costs a line of the log and nothing else."""
+
+import logging
+import shutil
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+import pytest
+
+from manipnet.synthesis.model.bundle import BundleError, load_bundle
+from manipnet.synthesis.model.layout import INPUT_SIZE
+
+HAS_CUDA = "CUDAExecutionProvider" in onnxruntime.get_available_providers()
+
+
+@pytest.mark.skipif(HAS_CUDA, reason="this machine's ONNX Runtime has CUDA")
+def test_without_cuda_the_processor_does_it_and_a_line_says_why(tiny_bundle: Path, caplog) -> None:
+    rows = np.random.default_rng(0).normal(size=(3, INPUT_SIZE)).astype(np.float32)
+    wanted = load_bundle(tiny_bundle, "cpu").infer(rows)
+    with caplog.at_level(logging.WARNING):
+        bundle = load_bundle(tiny_bundle, "cuda")
+    assert "manipnet-live[gpu]" in caplog.text
+    assert "processor" in caplog.text
+    assert bundle.provider == "cpu"
+    np.testing.assert_array_equal(bundle.infer(rows), wanted)
+
+
+def test_nobody_who_asked_for_nothing_is_told_of_gpus(tiny_bundle: Path, caplog) -> None:
+    with caplog.at_level(logging.WARNING):
+        assert load_bundle(tiny_bundle, "auto").provider in ("cpu", "cuda")
+        assert load_bundle(tiny_bundle, "cpu").provider == "cpu"
+    assert HAS_CUDA or caplog.text == ""
+
+
+def test_a_network_has_one_thread(tiny_bundle: Path) -> None:
+    options = load_bundle(tiny_bundle).session.get_session_options()
+    assert options.intra_op_num_threads == options.inter_op_num_threads == 1
+    assert options.execution_mode == onnxruntime.ExecutionMode.ORT_SEQUENTIAL
+
+
+def test_endlessly_nested_json_is_refused(tiny_bundle: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "nested"
+    shutil.copytree(tiny_bundle, folder)
+    (folder / "bundle.json").write_text('{"format": ' * 100_000)
+    with pytest.raises(BundleError, match="not JSON"):
+        load_bundle(folder)

@@ -1,0 +1,217 @@
+"""A folder of takes: all that can be done is done, once, wherever it is done."""
+
+import json
+import multiprocessing
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_server import PATIENCE_S, scene
+
+from manipnet.recording.mcap_file import RecordingWriter
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+from manipnet.wire.bodies import BodyFrame, BodySample
+from manipnet_tools import cli
+from manipnet_tools.batch.command import find_takes, take_names
+from manipnet_tools.batch.job import Job
+from manipnet_tools.batch.local import run_here
+
+CUBE = LIBRARY_FOLDER / "cube.ply"
+
+
+def record(path: Path, seconds: float = 1.3, prop: str = "Box") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with RecordingWriter(path, {}) as writer:
+        for k in range(round(seconds * 120)):
+            poses = {str(name): pose for name, pose in scene(k / 120).items() if pose is not None}
+            bodies = [
+                BodySample(None, prop if name == "Box" else name, tuple(pose[:3]), tuple(pose[3:]), True)
+                for name, pose in poses.items()
+            ]
+            writer.write_bodies(BodyFrame(k / 120, k, tuple(bodies), 0.0, "test"), k * 8_333_333)
+    return path
+
+
+@pytest.fixture
+def takes(tmp_path: Path) -> Path:
+    """Two good takes, three bad ones, and a text that is none."""
+    folder = tmp_path / "takes"
+    for name in ("a", "day2/b"):
+        record(folder / f"{name}.mcap")
+    record(folder / "short.mcap", 0.5)
+    record(folder / "other.mcap", prop="Hat")
+    (folder / "broken.csv").write_text("nothing\n")
+    (folder / "readme.txt").write_text("Read me.\n")
+    return folder
+
+
+def batch(takes: Path, out: Path, model: Path, *more: str) -> int:
+    options = ["--mesh", f"Box={CUBE}", "--model", str(model), "--out", str(out), *more]
+    return cli.main(["batch", str(takes), *options])
+
+
+def summary(out: Path) -> dict[str, dict]:
+    return {take["name"]: take for take in json.loads((out / "summary.json").read_text())["takes"]}
+
+
+def check_results(out: Path) -> None:
+    said = summary(out)
+    states = {name: take["state"] for name, take in said.items()}
+    assert states == {"a": "done", "day2_b": "done", "short": "failed", "other": "failed", "broken": "failed"}
+    assert "more than 1 s" in said["short"]["reason"]
+    assert said["other"]["reason"] == "no --mesh: at least one of Hat needs one"
+    assert said["broken"]["reason"].startswith("is no CSV export of Motive")
+    assert sorted(path.name for path in out.glob("*.npz")) == ["a.npz", "day2_b.npz"]
+    assert not list(out.glob("*.part"))
+    with np.load(out / "a.npz") as file:
+        assert len(file["time"]) == said["a"]["frames"] > 10
+        assert file["left_positions"].shape[1:] == (22, 3)
+
+
+def test_a_failed_take_does_not_stop_the_others(
+    takes: Path, tmp_path: Path, tiny_bundle: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert batch(takes, out, tiny_bundle, "--jobs", "2") == 1
+    check_results(out)
+    said = capsys.readouterr().err
+    assert "3 of 5 takes failed" in said
+    assert "times real time" in " ".join(said.split())
+    stamps = {path.name: path.stat().st_mtime_ns for path in out.glob("*.npz")}
+
+    for name in ("short.mcap", "other.mcap", "broken.csv"):
+        (takes / name).unlink()
+    record(takes / "c.mcap")
+    assert batch(takes, out, tiny_bundle, "--jobs", "1") == 0
+    states = {name: take["state"] for name, take in summary(out).items()}
+    assert states == {"a": "skipped", "c": "done", "day2_b": "skipped"}
+    assert stamps == {name: (out / name).stat().st_mtime_ns for name in stamps}
+    assert summary(out)["a"]["frames"] > 10
+
+    record(takes / "new.mcap", 1.6).replace(takes / "a.mcap")
+    (out / "c.json").write_text('{"cut')
+    assert batch(takes, out, tiny_bundle, "--jobs", "1") == 0
+    states = {name: take["state"] for name, take in summary(out).items()}
+    assert states == {"a": "done", "c": "done", "day2_b": "skipped"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
+def test_a_process_that_dies_costs_one_take(takes: Path, tmp_path: Path, tiny_bundle: Path) -> None:
+    jobs = [
+        Job(name, takes / file, {"Box": CUBE}, tiny_bundle, 0.5, None, tmp_path / f"{name}.npz")
+        for name, file in (("first", "a.mcap"), ("second", "day2/b.mcap"))
+    ]
+    killed: list[str] = []
+
+    def kill_once(name: str, done: int, total: int) -> None:
+        if not killed:
+            killed.append(name)
+            (process,) = multiprocessing.active_children()
+            assert process.pid is not None
+            os.kill(process.pid, signal.SIGKILL)
+
+    outcomes = list(run_here(jobs, 1, kill_once))
+    by_name = {outcome.name: outcome for outcome in outcomes}
+    assert by_name["second"].state == "done"
+    assert by_name["first"].state in ("failed", "done")
+    assert not multiprocessing.active_children()
+
+
+def test_takes_are_found_at_any_depth_and_named_apart(tmp_path: Path) -> None:
+    for name in ("one/leftHand.bvh", "one/rightHand.bvh", "walk.csv", "walk.mcap", "day/walk.csv", "notes.txt", "a.md"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("x")
+    (tmp_path / "demo.txt").write_text("120\n1,2\n")
+    found = find_takes(tmp_path)
+    assert [str(path.relative_to(tmp_path)) for path in found] == [
+        "day/walk.csv",
+        "demo.txt",
+        "one",
+        "walk.csv",
+        "walk.mcap",
+    ]
+    assert take_names(tmp_path, found) == ["day_walk", "demo", "one", "walk.csv", "walk.mcap"]
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"--jobs": "0"}, "--jobs is 0; allowed are 1 and more"),
+        ({"--look-ahead": "2"}, "--look-ahead is 2.0 s; allowed are 0 to 0.5"),
+        ({"--mesh": "cube"}, "--mesh cube: must be NAME=FILE"),
+        ({"--mesh": "Box=gone.obj"}, "gone.obj"),
+        ({"--model": "gone"}, "model 'gone' is no folder and no shipped bundle"),
+    ],
+)
+def test_what_no_take_could_be_done_with_is_said_first(
+    takes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: dict[str, str], complaint: str
+) -> None:
+    options = {"--out": str(tmp_path / "out")} | change
+    assert cli.main(["batch", str(takes), *(word for pair in options.items() for word in pair)]) == 1
+    assert complaint in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_without_takes_says_what_a_take_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
+    assert "holds no take; a take is a folder of BVH files" in capsys.readouterr().err
+    assert cli.main(["batch", str(tmp_path / "x.csv"), "--out", str(tmp_path / "out")]) == 1
+    assert "is no folder" in capsys.readouterr().err
+
+
+@pytest.fixture
+def two_workers(tmp_path: Path) -> Iterator[str]:
+    """A Ray cluster of somebody else's on this machine, with two workers; its address."""
+    pytest.importorskip("ray", reason="Ray is not installed: python -m pip install 'manipnet-live[cluster]'")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    options = f"--head --block --num-cpus=2 --port={port} --node-ip-address=127.0.0.1 --include-dashboard=false"
+    options += f" --object-store-memory=100000000 --temp-dir={tempfile.mkdtemp(prefix='ray', dir='/tmp')}"
+    command = [Path(sys.executable).with_name("ray"), "start", *options.split()]
+    environment = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0"}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
+    ) as head:
+        assert head.stdout is not None
+        said = []
+        while not any("Ray runtime started" in line for line in said):
+            line = head.stdout.readline()
+            assert line, said
+            said.append(line)
+        yield f"127.0.0.1:{port}"
+        assert head.poll() is None, "a cluster of somebody else's was shut down"
+        head.terminate()
+        head.stdout.read()
+        head.wait(PATIENCE_S)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ray's command does not run on Windows")
+def test_a_cluster_does_the_same(
+    takes: Path, tmp_path: Path, tiny_bundle: Path, two_workers: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, here = tmp_path / "out", tmp_path / "here"
+    assert batch(takes, out, tiny_bundle, "--ray", two_workers) == 1
+    check_results(out)
+    assert batch(takes, here, tiny_bundle, "--jobs", "1") == 1
+    with np.load(out / "a.npz") as ours, np.load(here / "a.npz") as theirs:
+        assert all(np.array_equal(ours[key], theirs[key]) for key in theirs.files)
+    assert batch(takes, here, tiny_bundle, "--ray", two_workers) == 1
+    states = {take["state"] for name, take in summary(here).items() if name in ("a", "day2_b")}
+    assert states == {"skipped"}, "what was done without a cluster is not done again on one"
+
+
+def test_no_cluster_is_said_with_the_remedy(
+    takes: Path, tmp_path: Path, tiny_bundle: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    monkeypatch.delitem(sys.modules, "manipnet_tools.batch.cluster", raising=False)
+    assert batch(takes, tmp_path / "out", tiny_bundle, "--ray", "auto") == 1
+    assert "pip install 'manipnet-live[cluster]'" in capsys.readouterr().err

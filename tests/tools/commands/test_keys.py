@@ -1,0 +1,43 @@
+"""`manipnet keys`, as a person uses it."""
+
+import pytest
+
+from manipnet.net.curve_keys import read_allow_list, read_client_keys
+from manipnet_tools.commands.keys import default_folder, main
+
+
+@pytest.fixture
+def keys(tmp_path, capsys):
+    """Runs the command on a fresh folder; gives status and what was said."""
+
+    def run(*words):
+        status = main(["--folder", str(tmp_path / "keys"), *words])
+        said = capsys.readouterr()
+        return status, said.out + said.err
+
+    run.folder = tmp_path / "keys"
+    return run
+
+
+def test_from_nothing_to_a_listed_client(keys):
+    status, said = keys("list")
+    assert (status, "manipnet keys make server" in said) == (1, True)
+    assert keys("make", "server")[0] == 0
+    assert "no client may connect yet" in keys("list")[1]
+    assert keys("make", "stage-pc")[0] == 0
+    client = read_client_keys(keys.folder / "stage-pc.toml")
+    assert f"{client.pair.public}  stage-pc" in keys("list")[1]
+    assert client.pair.secret not in keys("list")[1]
+    assert list(read_allow_list(keys.folder / "clients.allow").values()) == ["stage-pc"]
+
+
+@pytest.mark.parametrize(("words", "says"), [(("make", "../x"), "no client name"), (("make", "a"), "make server")])
+def test_what_cannot_be_made_is_said(keys, words, says):
+    if says != "make server":
+        keys("make", "server")
+    status, said = keys(*words)
+    assert (status, says in said) == (1, True)
+
+
+def test_a_folder_of_the_user_is_the_default():
+    assert default_folder().name == "keys"

@@ -1,0 +1,170 @@
+"""`manipnet record` beside a real server, and in the place of one."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_server import PATIENCE_S, Sender, Stage, scene
+
+from manipnet.recording.mcap_file import (
+    BODIES,
+    HANDS,
+    RecordingError,
+    RecordingWriter,
+    mesh_file,
+    read_about,
+    read_bodies,
+    read_hands,
+)
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER, load_library_mesh
+from manipnet.wire import HandsMessage
+from manipnet.wire.bodies import BodyFrame, BodySample
+from manipnet_tools import cli
+from manipnet_tools.commands.record import record_bodies, record_hands
+from manipnet_tools.takes.meshes import recorded_meshes
+from manipnet_tools.takes.take import read_take
+
+
+def address(stage: Stage, what: str) -> str:
+    return stage.server.addresses[what].removeprefix("tcp://")
+
+
+def test_what_a_server_says_is_recorded(stage: Stage, tmp_path: Path) -> None:
+    path = tmp_path / "take.mcap"
+    heard: dict[int, HandsMessage] = {}
+    with RecordingWriter(path, {}) as writer:
+        recorder = threading.Thread(
+            target=record_hands,
+            args=(address(stage, "hands"), None, None, writer, lambda: writer.counts[HANDS] < 40),
+        )
+        recorder.start()
+        while recorder.is_alive():
+            heard |= {message.seq: message for message in stage.perform(0.5, scene)}
+    recorded = list(read_hands(path))
+    assert len(recorded) >= 40
+    assert [message.seq - recorded[0].seq for message in recorded] == list(range(len(recorded)))
+    both = [(message, heard[message.seq]) for message in recorded if message.seq in heard]
+    assert len(both) > 20
+    for a, b in both:
+        assert np.array_equal(a.hands["left"].joints, b.hands["left"].joints)
+    take = read_take(path)
+    assert set(take.bodies) == {"left_wrist", "right_wrist", "Box"}
+    assert take.rate_hz == pytest.approx(60.0, abs=0.01)
+
+
+def test_a_recording_names_the_model_and_keeps_the_meshes(
+    stage: Stage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "take.mcap"
+    server = ["--server", address(stage, "hands"), "--control", address(stage, "control")]
+    swapped = stage.server.ask({"op": "select_object", "body": "Box", "object": "mug", "scale": 0.8})
+    assert swapped.get("object") == "mug"
+    assert cli.main(["record", "--out", str(path), "--seconds", "0.1", *server]) == 0
+    assert "hands messages" in capsys.readouterr().err
+    about = read_about(path)
+    hello = stage.server.ask({"op": "hello"})
+    assert about.whole
+    assert {key: about.metadata[key] for key in ("model", "model_hash", "session")} == {
+        key: hello[key] for key in ("model", "model_hash", "session")
+    }
+    assert list(about.meshes) == ["Box.ply"]
+    mug, kept = load_library_mesh("mug", 0.8), recorded_meshes(path)["Box"]
+    assert np.allclose(kept.vertices, mug.vertices, atol=1e-6)
+    assert np.array_equal(kept.faces, mug.faces)
+
+
+def test_bodies_are_recorded_without_a_server(tmp_path: Path) -> None:
+    def send(where: str) -> None:
+        sender = Sender(where)
+        for k in range(120):
+            sender.send(k / 120, scene(k / 120))
+        sender.close()
+
+    path = tmp_path / "take.mcap"
+    senders: list[threading.Thread] = []
+
+    def listening(where: str) -> None:
+        senders.append(threading.Thread(target=send, args=(where,)))
+        senders[0].start()
+
+    with RecordingWriter(path, {}) as writer:
+        record_bodies(0, writer, lambda: writer.counts[BODIES] < 120, listening)
+    senders[0].join(PATIENCE_S)
+    assert [frame.t_s for frame in read_bodies(path)] == [k / 120 for k in range(120)]
+
+
+def test_a_killed_recorder_leaves_a_take(tmp_path: Path) -> None:
+    path = tmp_path / "take.mcap"
+    command = [sys.executable, "-m", "manipnet_tools.cli", "record", "--bodies-port", "0", "--out", str(path)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=os.environ | {"COLUMNS": "200"}) as recorder:
+        assert recorder.stderr is not None
+        sender = Sender(next(word for line in recorder.stderr for word in line.split() if word.startswith("tcp://")))
+        sent, give_up_s = 0, time.monotonic() + PATIENCE_S
+        while (on_disk := frames_on_disk(path)) < 200:
+            assert time.monotonic() < give_up_s
+            for _ in range(20):
+                sender.send(sent / 120, scene(sent / 120))
+                sent += 1
+        recorder.kill()
+        recorder.wait(PATIENCE_S)
+        sender.close()
+    frames = list(read_bodies(path))
+    assert len(frames) >= on_disk
+    assert [frame.t_s for frame in frames] == [k / 120 for k in range(len(frames))]
+    assert cli.main(["recover", str(path), "--out", str(tmp_path / "mended.mcap")]) == 0
+    assert len(read_take(tmp_path / "mended.mcap").time_s) == len(frames)
+
+
+def frames_on_disk(path: Path) -> int:
+    try:
+        return sum(1 for _ in read_bodies(path))
+    except RecordingError:
+        return 0
+
+
+def record_scene(path: Path, seconds: float, meshes: dict[str, bytes] | None = None) -> Path:
+    """A recording of what a tracker sent during `scene`."""
+    with RecordingWriter(path, {}, meshes) as writer:
+        for k in range(round(seconds * 120) + 1):
+            poses = {str(name): pose for name, pose in scene(k / 120).items() if pose is not None}
+            bodies = [BodySample(None, name, tuple(pose[:3]), tuple(pose[3:]), True) for name, pose in poses.items()]
+            writer.write_bodies(BodyFrame(k / 120, k, tuple(bodies), 0.0, "test"), k * 8_333_333)
+    return path
+
+
+def test_a_recording_goes_in_where_the_tracker_did(stage: Stage, tmp_path: Path) -> None:
+    """Through the real socket, with another object than when it was recorded."""
+    path = record_scene(tmp_path / "take.mcap", 2.5)
+    assert stage.server.ask({"op": "select_object", "body": "Box", "object": "sphere"})["object"] == "sphere"
+    assert cli.main(["replay", str(path), "--to", stage.server.addresses["bodies"]]) == 0
+    shown = [stage.subscriber.next()]
+    while not 2.4 < shown[-1].t_capture < 10.0:
+        shown.append(stage.subscriber.next())
+        assert len(shown) < 3_000
+    late = [m for m in shown if 1.0 < m.t_capture < 2.4 and "left" in m.hands]  # eased there from the run before
+    live = [m for m in late if m.hands["left"].state == "live"]
+    assert len(live) > 10  # a busy machine may skip ticks
+    for message in live:
+        assert np.allclose(message.hands["left"].wrist, scene(message.t_capture)["left_wrist"], atol=2e-3)
+        assert message.hands["left"].object == "Box"
+
+
+def test_a_recording_is_synthesised_again_with_another_object(tiny_bundle: Path, tmp_path: Path) -> None:
+    cube = load_library_mesh("cube")
+    path = record_scene(tmp_path / "take.mcap", 1.5, {"Box.ply": mesh_file(cube.vertices, cube.faces)})
+
+    def fingers(name: str, *mesh: str) -> np.ndarray:
+        options = [str(path), *mesh, "--model", str(tiny_bundle), "--out", str(tmp_path / name)]
+        assert cli.main(["synthesize", *options]) == 0
+        with np.load(tmp_path / name) as file:
+            assert file["objects"].tolist() == ["Box"]
+            return file["left_positions"]
+
+    kept = fingers("kept.npz")
+    assert np.allclose(kept, fingers("cube.npz", "--mesh", f"Box={LIBRARY_FOLDER / 'cube.ply'}"), atol=1e-5)
+    assert np.abs(kept - fingers("bottle.npz", "--mesh", f"Box={LIBRARY_FOLDER / 'bottle.ply'}")).max() > 2e-3

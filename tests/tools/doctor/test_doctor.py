@@ -1,0 +1,249 @@
+"""`manipnet doctor`: the reasoning as tables, and the command over real sockets."""
+
+import itertools
+import socket
+import threading
+
+import msgpack
+import pytest
+import zmq
+from fake_motive import FakeMotive
+
+from manipnet.control.service import Control
+from manipnet.net.curve_keys import make_client_keys, make_server_keys, read_server_keys
+from manipnet.telemetry import Counters
+from manipnet.wire.bodies import BodyFrame, BodySample
+from manipnet_tools.doctor import command as doctor
+from manipnet_tools.doctor import other_interfaces as elsewhere
+from manipnet_tools.doctor.diagnosis import Heard, SourceHeard, diagnose
+from manipnet_tools.doctor.from_status import of_server
+
+PARTS = {"left_wrist": "left_wrist", "right_wrist": 2}
+
+
+def stream(*bodies, rate_hz=120.0, seconds=2.0, clock=1.0, source="osc:a"):
+    """What one sender sent: bodies as `(id, name, tracked)`."""
+    heard = SourceHeard()
+    samples = tuple(BodySample(id, name, (0, 1, 0), (0, 0, 0, 1), tracked) for id, name, tracked in bodies)
+    for n in range(round(rate_hz * seconds)):
+        heard.add(BodyFrame(clock * n / rate_hz, n, samples, n / rate_hz, source))
+    return {source: heard}
+
+
+GOOD = stream((1, "left_wrist", True), (2, "R", True))
+
+
+def problems(sources, dropped=None, complaints=(), parts=PARTS):
+    findings = diagnose(Heard(sources, dropped or {}, complaints), parts, {"osc": "udp://127.0.0.1:39540"})
+    assert all(finding.remedy for finding in findings if finding.level == "problem")
+    return [f"{f.text} → {f.remedy}" for f in findings if f.level == "problem"]
+
+
+def test_a_good_stream_has_no_problem():
+    assert problems(GOOD) == []
+
+
+@pytest.mark.parametrize(
+    ("sources", "dropped", "says"),
+    [
+        ({}, {}, ["nothing arrives at all → is the sender running and sending to udp://127.0.0.1:39540"]),
+        ({}, {"malformed": 9}, ["9 dropped as malformed", "packets arrive, but none that is understood"]),
+        (GOOD, {"kernel": 3}, ["3 dropped as kernel → too much traffic"]),
+        (
+            stream((2, None, True)),
+            {},
+            ["left_wrist: no body 'left_wrist' arrives → give it that name", "let the rig name one of: 2"],
+        ),
+        (stream((1, "left_wrist", True), (2, None, False)), {}, ["right_wrist: body 2 arrives but is never tracked"]),
+        (stream((1, "left_wrist", True), (2, None, True), rate_hz=10), {}, ["10 frames a second → send 30 to 360"]),
+        (
+            stream((1, "left_wrist", True), (2, None, True), clock=1e-3),
+            {},
+            ["0.001 s in one second of ours → ZeroMQ's t"],
+        ),
+        (stream((1, "left_wrist", True), (2, None, True), clock=0), {}, ["its clock makes 0 s"]),
+        (
+            {**GOOD, **stream((2, None, True), source="zmq:b")},
+            {},
+            ["comes from 2 senders: osc:a, zmq:b → stop all but one"],
+        ),
+    ],
+)
+def test_problems_are_named_with_their_remedy(sources, dropped, says):
+    found = " | ".join(problems(sources, dropped))
+    for words in says:
+        assert words in found
+
+
+def test_what_the_reader_said_is_passed_on():
+    (found, _) = problems({}, {"malformed": 2}, ["osc:a dropped (malformed): bad address"])
+    assert "osc:a dropped (malformed): bad address" in found
+
+
+def test_an_id_may_be_named_as_text():
+    assert problems(stream((1, "left_wrist", True), (None, "2", True))) == []
+
+
+@pytest.fixture
+def ports(monkeypatch):
+    monkeypatch.setattr(doctor, "ANSWER_S", 0.1)
+    with socket.socket() as tcp, socket.socket() as other, socket.socket(type=socket.SOCK_DGRAM) as udp:
+        for made in (tcp, other, udp):
+            made.bind(("127.0.0.1", 0))
+        numbers = [made.getsockname()[1] for made in (tcp, udp, other)]
+    names = ("--input-port", "--osc-port", "--control-port")
+    return [f"{name}={number}" for name, number in zip(names, numbers, strict=True)]
+
+
+def port(ports, name):
+    return int(next(p for p in ports if p.startswith(name)).partition("=")[2])
+
+
+def test_nothing_arrives(ports, capsys):
+    assert doctor.main([*ports, "--seconds=0.1"]) == 1
+    assert "nothing arrives at all" in capsys.readouterr().out
+
+
+def test_a_port_in_use(ports, capsys):
+    with socket.socket(type=socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", port(ports, "--osc-port")))
+        assert doctor.main([*ports, "--seconds=0.1"]) == 1
+    said = capsys.readouterr().out
+    assert "cannot listen for OSC" in said
+    assert "ss -lntup" in said
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--host=203.0.113.9"], "name an address of this machine: 127.0.0.1"),
+        (["--natnet=127.0.0.1", "--interface=203.0.113.9"], "name an address of this machine: 127.0.0.1"),
+        (["--natnet=192.0.2.1", "--interface=127.0.0.1"], "cannot send to 192.0.2.1"),
+    ],
+)
+def test_a_wrong_interface(ports, capsys, options, says):
+    assert doctor.main([*ports, "--seconds=0.2", *options]) == 1
+    assert says in capsys.readouterr().out
+
+
+def test_packets_for_another_address_of_this_machine(ports, capsys, monkeypatch):
+    monkeypatch.setattr(elsewhere, "own_addresses", lambda: {"127.0.0.1", "127.0.0.2"})
+    osc, bodies = (port(ports, name) for name in ("--osc-port", "--input-port"))
+
+    def send(seconds):
+        with socket.socket(type=socket.SOCK_DGRAM) as udp, socket.create_connection(("127.0.0.2", bodies)):
+            for _ in range(3):
+                udp.sendto(b"whatever", ("127.0.0.2", osc))
+
+    monkeypatch.setattr(doctor, "listen", send)
+    assert doctor.main([*ports]) == 1
+    said = capsys.readouterr().out
+    assert f"3 packets or connections came to 127.0.0.2:{osc}, but the server is to listen on 127.0.0.1" in said
+    assert f"1 packets or connections came to 127.0.0.2:{bodies}" in said
+    assert "start the server with --host 127.0.0.2" in said
+
+
+def test_a_server_with_keys_is_asked_with_one(ports, capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
+    make_server_keys(tmp_path)
+    path = make_client_keys(tmp_path, "stage-pc")
+    handlers = {"status": lambda request: {"counters": {"frames_in": {"osc": 5}}, "actors": {}}}
+    control = Control("127.0.0.1", port(ports, "--control-port"), handlers, Counters(), read_server_keys(tmp_path))
+    control.start()
+    assert doctor.main([*ports, f"--key={path}"]) == 0
+    control.stop()
+    assert "frames that arrived: 5 by osc" in capsys.readouterr().out
+    assert doctor.main([*ports, f"--key={tmp_path / 'none.toml'}"]) == 1
+    assert "none.toml does not exist" in capsys.readouterr().out
+
+
+def test_bodies_that_arrive_are_compared_with_the_rig(ports, capsys):
+    stop = threading.Event()
+
+    def send():
+        with zmq.Context() as context, context.socket(zmq.PUB) as publisher:
+            publisher.setsockopt(zmq.LINGER, 0)
+            publisher.connect(f"tcp://127.0.0.1:{port(ports, '--input-port')}")
+            body = {"p": [0, 1, 0], "q": [0, 0, 0, 1]}
+            for n in itertools.count():
+                bodies = [{"name": "left_wrist", **body}, {"name": "rightwrist", **body}]
+                publisher.send(msgpack.packb({"t": n / 120, "bodies": bodies}))
+                if stop.wait(1 / 120):
+                    return
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    assert doctor.main([*ports, "--seconds=1"]) == 1
+    stop.set()
+    thread.join()
+    said = capsys.readouterr().out
+    assert "left_wrist: body 'left_wrist' is tracked in 100 %" in said
+    assert "right_wrist: no body 'right_wrist' arrives" in said
+    assert "'rightwrist'" in said
+
+
+@pytest.mark.parametrize(
+    ("version", "says"),
+    [((3, 0), "answers but streams no frames"), ((2, 9), "speaks NatNet 2.9; 3.0")],
+)
+def test_motive_that_answers(ports, capsys, version, says):
+    with FakeMotive(version, {1: "left_wrist"}) as motive:
+        assert doctor.main([*ports, "--seconds=0.5", f"--natnet=127.0.0.1:{motive.port}"]) == 1
+    assert says in capsys.readouterr().out
+
+
+def test_motive_that_does_not_answer(ports, capsys):
+    with socket.socket(type=socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        assert doctor.main([*ports, "--seconds=0.1", f"--natnet=127.0.0.1:{silent.getsockname()[1]}"]) == 1
+    assert "Motive does not answer" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("counters", "bodies", "says"),
+    [
+        ({}, {}, "nothing arrives at all"),
+        ({"frames_in": {"osc": 5}, "frames_dropped": {"unknown_body": 5}}, {}, "5 frames hold no body the rig knows"),
+        ({"frames_in": {"osc": 5}}, {"Box": {"state": "rest", "age_s": 9}}, "actor: Box is not tracked at present"),
+        ({"frames_in": {"osc": 5}}, {"Box": {"state": "rest", "age_s": None}}, "actor: Box has never been tracked"),
+        ({"frames_in": {"osc": 5}, "frames_dropped": {"kernel": 7}}, {}, "7 dropped as kernel"),
+        ({"frames_in": {"osc": 5}}, {"Box": {"state": "live"}}, "frames that arrived: 5 by osc"),
+    ],
+)
+def test_a_running_server_is_asked(ports, capsys, monkeypatch, counters, bodies, says):
+    monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
+    with zmq.Context() as context, context.socket(zmq.REP) as server:
+        server.bind(f"tcp://127.0.0.1:{port(ports, '--control-port')}")
+        answer = {"counters": counters, "actors": {"actor": {"bodies": bodies}}}
+
+        def serve():
+            server.recv()
+            server.send_json(answer)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        doctor.main([*ports, "--seconds=0"])
+        thread.join()
+    assert says in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("state", "problem", "says"),
+    [
+        ("connecting", None, "Motive does not answer"),
+        ("connected", None, "answers but streams no frames"),
+        ("silent", None, "has fallen silent"),
+        ("connected", "it speaks Klingon", "NatNet: it speaks Klingon"),
+        ("streaming", None, "Motive, NatNet 3.0 answers; rigid bodies it defines: 1 'Box'"),
+    ],
+)
+def test_a_running_server_tells_of_motive(state, problem, says):
+    motive = {"state": state, "server": "Motive, NatNet 3.0", "bodies": {"1": "Box"}, "problem": problem}
+    findings = of_server({"counters": {"frames_in": {"natnet": 1}}, "natnet": motive}, "here")
+    assert any(says in finding.text for finding in findings)
+    assert any(finding.level == "problem" for finding in findings) == (state != "streaming")
+
+
+def test_a_wrong_rig_file_is_named(ports, tmp_path, capsys):
+    assert doctor.main([*ports, f"--rig={tmp_path / 'none.toml'}"]) == 1
+    assert "none.toml" in capsys.readouterr().out

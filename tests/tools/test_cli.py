@@ -1,0 +1,113 @@
+"""`manipnet VERB`: every verb explains itself, works, and says in one line what it cannot do."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_server import scene
+
+from manipnet.recording.mcap_file import RecordingWriter, read_about
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+from manipnet.wire.bodies import BodyFrame, BodySample
+from manipnet_tools import cli
+
+CUBE = LIBRARY_FOLDER / "cube.ply"
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """Two hands that swing a box for 1.5 s."""
+    path = tmp_path / "swing.mcap"
+    with RecordingWriter(path, {"model": "none"}) as writer:
+        for k in range(181):
+            bodies = [
+                BodySample(None, str(name), tuple(pose[:3]), tuple(pose[3:]), True)
+                for name, pose in scene(k / 120).items()
+                if pose is not None
+            ]
+            writer.write_bodies(BodyFrame(50.0 + k / 120, k, tuple(bodies), 0.0, "test"), k * 8_333_333)
+    return path
+
+
+def error_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert cli.main(arguments) == 1
+    return capsys.readouterr().err
+
+
+NEEDED = {"train": "torch", "ablate": "torch", "bench": "torch", "quantise": "onnx"}
+"""Packages of the extra `train` without which a verb says how to get them."""
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    if verb in NEEDED:
+        pytest.importorskip(NEEDED[verb])
+    with pytest.raises(SystemExit, match="0"):
+        cli.main([verb, "--help"])
+    text = capsys.readouterr().out
+    assert f"manipnet{'-' if verb == 'serve' else ' '}{verb}" in text
+    assert "examples:" in text
+
+
+def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--help"]) == 0
+    text = capsys.readouterr().out
+    assert all(f"  {verb} " in text for verb in cli.VERBS)
+    assert "examples:" in text
+    assert cli.main([]) == 2
+    assert cli.main(["--version"]) == 0
+
+
+def test_an_unknown_verb_gets_the_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["conjure"]) == 2
+    assert "no verb 'conjure'; verbs are serve, replay" in capsys.readouterr().err
+
+
+def test_synthesize_writes_both_hands(recording: Path, tiny_bundle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "fingers.npz"
+    options = ["--mesh", f"Box={CUBE}", "--model", str(tiny_bundle), "--look-ahead", "0.25", "--out", str(out)]
+    assert cli.main(["synthesize", str(recording), *options]) == 0
+    with np.load(out) as arrays:
+        time_s = arrays["time"]
+        assert np.allclose(np.diff(time_s), 1 / 60)
+        assert 0.0 <= time_s[0] <= 0.5 + 1e-6
+        assert time_s[-1] >= 1.0
+        for side in ("left", "right"):
+            assert arrays[f"{side}_positions"].shape == arrays[f"{side}_raw_positions"].shape == (len(time_s), 22, 3)
+            assert arrays[f"{side}_rotations"].shape == (len(time_s), 17, 4)
+            assert arrays[f"{side}_distances"].shape == (len(time_s), 22)
+            wrist = [scene(float(t))[f"{side}_wrist"] for t in time_s]
+            assert np.allclose(arrays[f"{side}_positions"][:, 0], np.array(wrist)[:, :3], atol=2e-3)
+
+
+def test_meshes_may_come_before_the_take(recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = str(tmp_path / "x.npz")
+    assert "--mesh Bax=b.ply: must be NAME=FILE with NAME one of Box" in error_of(
+        capsys, "synthesize", "--mesh", f"Box={CUBE}", "--mesh", "Bax=b.ply", str(recording), "--out", out
+    )
+    assert "no --mesh" in error_of(capsys, "synthesize", str(recording), "--out", out)
+
+
+def test_what_cannot_be_done_is_one_line(
+    recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert error_of(capsys, "replay", "gone", "--to", "tcp://127.0.0.1:1") == "manipnet replay: gone: no such take\n"
+    assert "must be tcp://HOST:PORT" in error_of(capsys, "replay", str(recording), "--to", "udp://x")
+    assert "File exists" in error_of(capsys, "recover", str(recording), "--out", str(recording))
+    (tmp_path / "text.mcap").write_text("text")
+    assert "is no recording" in error_of(
+        capsys, "recover", str(tmp_path / "text.mcap"), "--out", str(tmp_path / "out.mcap")
+    )
+    monkeypatch.setitem(sys.modules, "torch", None)
+    monkeypatch.delitem(sys.modules, "manipnet_tools.training.train", raising=False)
+    assert "pip install 'manipnet-live[train]'" in error_of(capsys, "train", "--data", ".", "--out", ".")
+
+
+def test_recover_mends_a_file(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    content = recording.read_bytes()
+    recording.write_bytes(content[: len(content) * 2 // 3])
+    mended = tmp_path / "mended.mcap"
+    assert cli.main(["recover", str(recording), "--out", str(mended)]) == 0
+    assert "was cut off or damaged" in capsys.readouterr().err.replace("\n", " ")
+    assert read_about(mended).whole

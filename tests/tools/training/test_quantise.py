@@ -1,0 +1,68 @@
+# ruff: noqa: E402
+"""Quantised weights: what they may cost in answers."""
+
+import numpy as np
+import pytest
+
+onnx = pytest.importorskip("onnx", reason="onnx is not installed: python -m pip install onnx")
+
+from manipnet.synthesis.model.bundle import open_session
+from manipnet.synthesis.model.layout import INPUT_SIZE
+from manipnet_tools.bench.reference import full_graph
+from manipnet_tools.training import quantise as compress
+
+WIDTH = 192
+
+
+@pytest.fixture(scope="module")
+def graph() -> bytes:
+    return full_graph(np.zeros(20), WIDTH)
+
+
+def _answers(graph: bytes, rows: np.ndarray) -> np.ndarray:
+    return np.asarray(open_session("graph", graph).run(None, {"features": rows})[0])
+
+
+def test_wide_layers_answer_nearly_the_same_in_4_bits(graph: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = np.random.default_rng(0).normal(size=(8, INPUT_SIZE)).astype(np.float32)
+    exact = _answers(graph, rows)
+    wrong = {}
+    for wide in (1024, 128):
+        monkeypatch.setattr(compress, "_WIDE", wide)
+        wrong[wide] = np.abs(exact - _answers(compress.quantise_weights(graph), rows)).mean() / exact.std(axis=0).mean()
+    assert wrong[1024] < 0.03
+    assert wrong[1024] < wrong[128] < 0.2
+
+
+def test_one_large_input_does_not_make_the_others_coarse(graph: bytes) -> None:
+    rows = np.random.default_rng(0).normal(size=(8, INPUT_SIZE)).astype(np.float32)
+    rows[:, 1000] = 60.0
+    exact, quantised = _answers(graph, rows), _answers(compress.quantise_weights(graph), rows)
+    wrong = exact - quantised
+    assert wrong.std(axis=0).mean() < 0.03 * exact.std(axis=0).mean()
+
+
+@pytest.mark.parametrize("wide", [1024, 128])
+def test_weights_are_where_they_were_to_one_level(graph: bytes, wide: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compress, "_WIDE", wide)
+    model = onnx.load_from_string(compress.quantise_weights(graph))
+    stored = {tensor.name: onnx.numpy_helper.to_array(tensor) for tensor in model.graph.initializer}
+    before = onnx.load_from_string(graph).graph.initializer
+    weights = {t.name: onnx.numpy_helper.to_array(t) for t in before if t.name.endswith(".weight")}
+    assert len(weights) == 8
+    for name, exact in weights.items():
+        levels, scales = stored[f"{name}_levels"], stored[f"{name}_scales"]
+        zero = 128.0
+        if min(exact.shape) >= wide:
+            levels, zero = np.stack([levels & 15, levels >> 4], axis=-1).reshape(*scales.shape, 32), 8.0
+        again = ((levels.astype(np.float32) - zero) * scales[..., None]).reshape(len(exact), -1)
+        np.testing.assert_allclose(again[:, : exact.shape[1]], exact, atol=1.01 * np.abs(scales).max())
+        assert np.all(again[:, exact.shape[1] :] == 0.0)
+
+
+def test_what_it_cannot_quantise_is_refused(graph: bytes) -> None:
+    model = onnx.load_from_string(graph)
+    gemm = next(node for node in model.graph.node if node.op_type == "Gemm")
+    gemm.attribute.append(onnx.helper.make_attribute("alpha", 2.0))
+    with pytest.raises(ValueError, match="can be quantised"):
+        compress.quantise_weights(model.SerializeToString())

@@ -1,0 +1,131 @@
+"""The hands message: golden vectors, round trips, and refusal of everything else."""
+
+import json
+import re
+from dataclasses import replace
+
+import make_vectors
+import msgpack
+import numpy as np
+import pytest
+from checkout import ROOT, VECTORS
+from hypothesis import given
+from hypothesis import strategies as st
+
+from manipnet import wire
+from manipnet.wire.bodies import MessageError
+from manipnet.wire.hands import BODY, HAND, HEADER
+
+MESSAGES = make_vectors.messages()
+EXPECTED = json.loads((VECTORS / "expected.json").read_text(encoding="utf-8"))
+LIVE = MESSAGES["live"]
+
+
+def test_files_are_what_the_schema_writes():
+    on_disk = {p.name: p.read_bytes() for p in VECTORS.iterdir() if p.suffix in (".bin", ".msgpack")}
+    on_disk["expected.json"] = (VECTORS / "expected.json").read_bytes()
+    stale = {n for n, data in make_vectors.files().items() if on_disk.get(n) != data}
+    assert not stale ^ (on_disk.keys() - make_vectors.files().keys()), "run tests/vectors/make_vectors.py"
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_binary_reads_as_expected(name):
+    message = wire.decode_binary((VECTORS / f"{name}.bin").read_bytes())
+    assert make_vectors.expected(message) == EXPECTED[name]
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_msgpack_reads_as_expected(name):
+    message = wire.decode_msgpack((VECTORS / f"{name}.msgpack").read_bytes())
+    assert make_vectors.expected(message) == EXPECTED[name]
+    assert message.session == MESSAGES[name].session
+
+
+@pytest.mark.parametrize("path", sorted(VECTORS.glob("bad_*.bin")), ids=lambda p: p.stem)
+def test_broken_binary_is_refused(path):
+    with pytest.raises(MessageError):
+        wire.decode_binary(path.read_bytes())
+
+
+def test_another_version_is_refused_with_both_named():
+    with pytest.raises(MessageError, match=r"version 2.* version 1"):
+        wire.decode_binary((VECTORS / "bad_version_2.bin").read_bytes())
+    with pytest.raises(MessageError, match=r"version 9.* version 1"):
+        wire.decode_msgpack(msgpack.packb({"v": 9}) or b"")
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"t_capture": float("nan")}, "t_capture"),
+        ({"seq": -1}, "seq"),
+        ({"hands": {"middle": LIVE.hands["left"]}}, "middle"),
+        ({"hands": {"left": replace(LIVE.hands["left"], state="dead")}}, "hands.left.state"),
+        ({"hands": {"left": replace(LIVE.hands["left"], scale=0.0)}}, "hands.left.scale"),
+        ({"hands": {"left": replace(LIVE.hands["left"], angles=np.full(20, np.inf))}}, "hands.left.angles"),
+        ({"hands": {"left": replace(LIVE.hands["left"], joints=np.ones((25, 7)))}}, "hands.left.joints"),
+        (
+            {"hands": {"left": replace(LIVE.hands["left"], rotations=np.ones((17, 4)))}},
+            "hands.left.rotations",
+        ),
+        ({"bodies": LIVE.bodies * 100}, "bodies"),
+        ({"bodies": (wire.BodyPose(True, np.zeros(7), "x"),)}, r"bodies\[0\]"),
+    ],
+)
+def test_no_bad_value_is_ever_sent(change, text):
+    for encode in (wire.encode_binary, wire.encode_msgpack):
+        with pytest.raises(MessageError, match=text):
+            encode(replace(LIVE, **change))
+
+
+def _paths(value, path=()):
+    yield path
+    if isinstance(value, dict):
+        for key in value:
+            yield from _paths(value[key], (*path, key))
+    elif isinstance(value, list) and value:
+        yield from _paths(value[-1], (*path, len(value) - 1))
+
+
+LIVE_MAP = msgpack.unpackb(wire.encode_msgpack(LIVE))
+JUNK = st.sampled_from([None, True, -1, 2**63, float("nan"), float("inf"), "x", b"\xff", [], [[1.0], 2.0], {}, {1: 2}])
+
+
+@given(st.sampled_from([p for p in _paths(LIVE_MAP) if p]), JUNK)
+def test_any_wrong_part_of_a_map_raises_only_message_error(path, junk):
+    message = msgpack.unpackb(wire.encode_msgpack(LIVE))
+    *parents, last = path
+    inner = message
+    for key in parents:
+        inner = inner[key]
+    inner[last] = junk
+    try:
+        wire.decode_msgpack(msgpack.packb(message) or b"")
+    except MessageError:
+        return
+
+
+@given(st.binary(max_size=64))
+def test_garbage_raises_only_message_error(data):
+    for decode in (wire.decode_binary, wire.decode_msgpack):
+        with pytest.raises(MessageError):
+            decode(data)
+
+
+@given(st.integers(0, 2855), st.binary(min_size=1, max_size=8))
+def test_a_changed_byte_never_escapes_as_another_error(offset, data):
+    good = wire.encode_binary(LIVE)
+    try:
+        message = wire.decode_binary((good[:offset] + data + good[offset + len(data) :])[: len(good)])
+    except MessageError:
+        return
+    wire.check(message)
+
+
+def test_protocol_document_states_the_true_layout():
+    text = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
+    rows = {(m[1], int(m[0])) for m in re.findall(r"^\| (\d+) \| `(\w+)`", text, re.MULTILINE)}
+    true = {(name, dtype.fields[name][1]) for dtype in (HEADER, HAND, BODY) for name in dtype.names}
+    assert rows == true
+    for name, dtype in (("Header", HEADER), ("Hand", HAND), ("Body", BODY)):
+        assert re.search(rf"{name} record, {dtype.itemsize} bytes", text)

@@ -1,0 +1,156 @@
+"""A scripted scene for two hands and some objects, turned into tracks: who grasps what, how, and where it goes.
+
+Hands are directed as right hands: a left hand is given the mirror image (through x = 0) of what is said in the world.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from manipnet.geometry import (
+    Array,
+    compose,
+    invert,
+    matrix_to_quat,
+    mirror_points,
+    mirror_poses,
+    quat_exp,
+    quat_multiply,
+    quat_rotate,
+)
+from manipnet_tools.assets.minimum_jerk import Move, ease, superpose, tremor
+
+Side = Literal["left", "right"]
+Vector = tuple[float, float, float]
+
+SIDES: tuple[Side, ...] = ("left", "right")
+GRIP_CENTRE_M: Vector = (0.125, 0.010, -0.058)
+"""Where people have the middle of what they hold, in the wrist frame: measured on captured grasps."""
+CLEARANCE_M: Vector = (-0.045, 0.0, 0.055)
+"""How a hand stands off an object, in its wrist frame, before it closes and after it opens."""
+SETTLE_S = 0.3
+"""An object takes up the tremor of the hand that lifts it within this time."""
+
+
+@dataclass(frozen=True)
+class Rest:
+    """The hand stays at a place in the world, `wrist (7,)`."""
+
+    start_s: float
+    end_s: float
+    wrist: Array
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """The hand is on a body, fixed to it; `fingers` and `palm` are world directions when the grasp begins."""
+
+    start_s: float
+    end_s: float
+    body: str
+    fingers: Vector
+    palm: Vector
+    at: Vector = (0.0, 0.0, 0.0)
+    """The point that is held, from the body's origin along the world's axes."""
+    centre: Vector = GRIP_CENTRE_M
+    """Where the held point is in the wrist frame."""
+
+
+def hand_pose(fingers: Vector, palm: Vector, p_world: Vector | Array, p_wrist: Vector = (0.0, 0.0, 0.0)) -> Array:
+    """A right wrist `(7,)` whose fingers and palm face two directions, with its point `p_wrist` at `p_world`."""
+    x = np.array(fingers) / np.linalg.norm(fingers)
+    z = x * (np.array(palm) @ x) - np.array(palm)
+    z /= np.linalg.norm(z)
+    rotation = matrix_to_quat(np.stack([x, np.cross(z, x), z], axis=-1))
+    return np.concatenate([np.array(p_world) - quat_rotate(rotation, np.array(p_wrist)), rotation])
+
+
+def object_pose(position: Vector, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Array:
+    """A pose `(7,)`: turned about Y, then leaned about the world's X, then Z; degrees."""
+    about_y, about_x, about_z = (
+        quat_exp(np.radians(angle) * np.eye(3)[axis]) for angle, axis in ((yaw, 1), (pitch, 0), (roll, 2))
+    )
+    return np.concatenate([position, quat_multiply(about_z, quat_multiply(about_x, about_y))])
+
+
+def perform(
+    time_s: Array,
+    homes: Mapping[str, Array],
+    moves: Mapping[str, Sequence[Move]],
+    hands: Mapping[Side, Sequence[Rest | Grasp]],
+) -> dict[str, Array]:
+    """World poses `(T, 7)` of both wrists and every body; `homes (7,)` are where the bodies start."""
+    period_s = float(time_s[-1] + time_s[1] - 2.0 * time_s[0])
+    tracks = {name: superpose(time_s, home, moves.get(name, ())) for name, home in homes.items()}
+    shakes = {side: tremor(time_s, period_s, salt) for salt, side in enumerate(SIDES)}
+    wrists = {}
+    for side in SIDES:
+        wrists[f"{side}_wrist"] = _wrist(time_s, side, hands[side], tracks)
+        wrists[f"{side}_wrist"][:, :3] += shakes[side]
+    for name, track in tracks.items():
+        grip = {side: _carried(time_s, name, hands[side], moves.get(name, ())) for side in SIDES}
+        total = np.maximum(sum(grip.values()), 1.0)
+        track[:, :3] += sum((grip[side] / total)[:, None] * shakes[side] for side in SIDES)
+    return wrists | tracks
+
+
+def _wrist(time_s: Array, side: Side, script: Sequence[Rest | Grasp], tracks: Mapping[str, Array]) -> Array:
+    """Wrist poses `(T, 7)`: fixed to what it is on, and reaching from one to the next in between."""
+    poses = np.empty((len(time_s), 7))
+    held = [_fixed(time_s, side, part, tracks) for part in script]
+    for part, track in zip(script, held, strict=True):
+        on = (time_s >= part.start_s) & (time_s <= part.end_s)
+        poses[on] = track[on]
+    for k in range(len(script) - 1):
+        a, b = script[k], script[k + 1]
+        between = (time_s > a.end_s) & (time_s < b.start_s)
+        last, first = (np.searchsorted(time_s, t) for t in (a.end_s, b.start_s))
+        start, goal = held[k][last], held[k + 1][first]
+        poses[between] = superpose(time_s[between], start, _reach(side, a, b, start, goal))
+    return poses
+
+
+def _reach(side: Side, a: Rest | Grasp, b: Rest | Grasp, start: Array, goal: Array) -> list[Move]:
+    """From one place to the next: off what is held, across, and onto what is to be held, without a stop."""
+    clear = np.array([*CLEARANCE_M, 0.0, 0.0, 0.0, 1.0])
+    if side == "left":
+        clear = mirror_poses(clear)
+    leaves, arrives = isinstance(a, Grasp), isinstance(b, Grasp)
+    across = (0.12 if leaves else 0.0, 0.80 if arrives else 1.0)
+    moves = []
+    if leaves:
+        moves.append((0.0, 0.42, compose(start, clear)))
+    moves.append((*across, compose(goal, clear) if arrives else goal))
+    if arrives:
+        moves.append((0.45, 1.0, goal))
+    span = b.start_s - a.end_s
+    return [Move(a.end_s + u * span, a.end_s + v * span, pose) for u, v, pose in moves]
+
+
+def _fixed(time_s: Array, side: Side, part: Rest | Grasp, tracks: Mapping[str, Array]) -> Array:
+    """Wrist poses `(T, 7)` as if the hand were there all the time."""
+    if isinstance(part, Rest):
+        wrist = part.wrist if side == "right" else mirror_poses(part.wrist)
+        return np.tile(wrist, (len(time_s), 1))
+    track = tracks[part.body]
+    T_world_body = track[np.searchsorted(time_s, part.start_s)]
+    point = T_world_body[:3] + np.array(part.at)
+    if side == "left":
+        T_world_wrist = mirror_poses(hand_pose(part.fingers, part.palm, mirror_points(point), part.centre))
+    else:
+        T_world_wrist = hand_pose(part.fingers, part.palm, point, part.centre)
+    return compose(track, compose(invert(T_world_body), T_world_wrist)[None])
+
+
+def _carried(time_s: Array, name: str, script: Sequence[Rest | Grasp], moves: Sequence[Move]) -> Array:
+    """How much a hand's tremor is the body's, `(T,)` in 0 to 1: while it holds the body off the table."""
+    share = np.zeros(len(time_s))
+    for part in script:
+        if isinstance(part, Grasp) and part.body == name:
+            within = [move for move in moves if move.start_s < part.end_s and move.end_s > part.start_s]
+            start, end = max(part.start_s, within[0].start_s), min(part.end_s, within[-1].end_s)
+            rise = ease(time_s, start, start + SETTLE_S)
+            share += rise - ease(time_s, end - SETTLE_S, end)
+    return share

@@ -1,0 +1,93 @@
+"""What is synthesised while it is timed: the bundled demo or any take, for any number of actors, without an end."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from manipnet.config.settings import WRISTS, ActorConfig, BodyConfig, ObjectConfig
+from manipnet.demo.player import DEMO_FILE, DEMO_OBJECTS
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+from manipnet.synthesis.objects.shape import Shape, load_shape
+from manipnet.wire.bodies import BodyFrame
+from manipnet_tools.commands.replay import take_frames
+from manipnet_tools.takes.take import TakeError, read_take
+
+APART = 0.37
+"""Share of the performance by which each actor is ahead of the one before, so that they do different things."""
+
+
+@dataclass(frozen=True)
+class Performance:
+    """Frames at an even rate, and the mesh file and shape of every prop in them."""
+
+    name: str
+    rate_hz: float
+    frames: Sequence[BodyFrame]
+    meshes: Mapping[str, Path]
+    shapes: Mapping[str, Shape]
+
+    def with_shape(self, shape: Shape) -> "Performance":
+        """The same motion with every prop of another shape."""
+        return replace(self, shapes=dict.fromkeys(self.shapes, shape))
+
+    @property
+    def triangles(self) -> str:
+        """How many triangles its props have."""
+        counts = sorted({len(shape.mesh.faces) for shape in self.shapes.values()})
+        return f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+
+
+def demo() -> Performance:
+    """What `manipnet-serve --demo` plays."""
+    return take(DEMO_FILE, {name: LIBRARY_FOLDER / f"{name}.ply" for name in DEMO_OBJECTS})
+
+
+def take(path: Path, meshes: Mapping[str, Path]) -> Performance:
+    """A take with a mesh for each of its objects. Raises `TakeError` and `MeshError`."""
+    recorded = read_take(path)
+    if missing := set(recorded.objects) - meshes.keys():
+        raise TakeError(f"{path}: no mesh for {', '.join(sorted(missing))}; give --mesh NAME=FILE for each")
+    shapes = {name: load_shape(meshes[name]) for name in recorded.objects}
+    frames = list(take_frames(recorded))
+    return Performance(recorded.name, recorded.rate_hz, frames, {name: meshes[name] for name in shapes}, shapes)
+
+
+def actor_names(actors: int) -> list[str]:
+    """Names of so many actors."""
+    return [f"actor{i}" for i in range(actors)]
+
+
+def actor_config(performance: Performance, name: str, actors: int) -> ActorConfig:
+    """One of `actors` performers, whose bodies are named as `endless` names them."""
+    prefix = _prefix(name, actors)
+    return ActorConfig(
+        name,
+        {wrist: BodyConfig(prefix + wrist) for wrist in WRISTS},
+        tuple(ObjectConfig(thing, BodyConfig(prefix + thing), path) for thing, path in performance.meshes.items()),
+    )
+
+
+def endless(performance: Performance, actors: int = 1) -> Iterator[BodyFrame]:
+    """The frames forth and back for ever, so that nothing jumps, with the bodies of every actor in each."""
+    frames = performance.frames
+    names = actor_names(actors)
+    ahead = [round(i * APART * len(frames)) for i in range(actors)]
+    k = 0
+    while True:
+        bodies = tuple(
+            replace(body, name=_prefix(name, actors) + (body.name or ""))
+            for name, shift in zip(names, ahead, strict=True)
+            for body in frames[_bounced(k + shift, len(frames))].bodies
+        )
+        t_s = k / performance.rate_hz
+        yield BodyFrame(t_s, k, bodies, t_s, "bench:performance")
+        k += 1
+
+
+def _prefix(name: str, actors: int) -> str:
+    return f"{name}/" if actors > 1 else ""
+
+
+def _bounced(k: int, count: int) -> int:
+    k %= max(2 * (count - 1), 1)
+    return k if k < count else 2 * (count - 1) - k

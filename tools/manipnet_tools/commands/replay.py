@@ -1,0 +1,130 @@
+"""`manipnet replay`: a take streamed to a server at its own rate, as a tracker would."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from manipnet.config.settings import ConfigError, parse_endpoint
+from manipnet.geometry import Array, quat_slerp
+from manipnet.inputs.playback import BodySender, OscBodySender, Played, ZmqBodySender, looped, play
+from manipnet.wire.bodies import BodyFrame, BodySample
+from manipnet_tools.signals import stop_on_signals
+from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
+
+PORTS = {"tcp": 5556, "osc": 39540}
+RATES_HZ = (1.0, 1000.0)
+SPEEDS = (0.01, 100.0)
+SHOW_S = 0.2
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Stream a take to a running server."""
+
+    take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
+    """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
+    to: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT|osc://HOST:PORT")]
+    """Where to: the server's --input-port over ZeroMQ (tcp://) or its --osc-port (osc://)."""
+    speed: Annotated[float, tyro.conf.arg(metavar="TIMES")] = 1.0
+    """Times as fast. Time stamps stay the take's own."""
+    loop: bool = False
+    """Play over and over, until stopped; time goes on rising."""
+    rate: Annotated[float | None, tyro.conf.arg(metavar="HZ")] = None
+    """Frames per second, resampled; the take's own rate by default."""
+
+
+def run(options: ReplayOptions) -> None:
+    """Play to the end, or for ever. Raises `TakeError`, `ConfigError` and `PlayError`."""
+    if not SPEEDS[0] <= options.speed <= SPEEDS[1]:
+        raise TakeError(f"--speed is {options.speed}; allowed are {SPEEDS[0]} to {SPEEDS[1]}")
+    take = read_take(options.take)
+    if options.rate is not None:
+        take = resample(take, options.rate)
+    frames = list(take_frames(take))
+    sender = connect(options.to)
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[state]}"))
+    try:
+        with Progress(*columns, console=console) as progress, stop_on_signals() as stopping:
+            task = progress.add_task(take.name, total=None if options.loop else len(frames), state="")
+            played = play(
+                looped(frames) if options.loop else frames,
+                sender,
+                options.speed,
+                stopping,
+                _occasionally(lambda so_far: progress.update(task, completed=so_far.frames, state=state(so_far))),
+            )
+            progress.update(task, completed=played.frames, state="")
+    finally:
+        sender.close()
+    console.print(f"sent {state(played)}")
+
+
+def connect(url: str) -> BodySender:
+    """The sender to `tcp://HOST[:PORT]` or `osc://HOST[:PORT]`. Raises `ConfigError` and `PlayError`."""
+    scheme, separator, rest = url.partition("://")
+    if not separator or scheme not in PORTS:
+        raise ConfigError(f"--to {url} must be tcp://HOST:PORT (ZeroMQ) or osc://HOST:PORT")
+    host, port = parse_endpoint(rest, PORTS[scheme])
+    return ZmqBodySender(host, port) if scheme == "tcp" else OscBodySender(host, port)
+
+
+def state(played: Played) -> str:
+    """How a performance stands, in words."""
+    late_ms = 1e3 * played.worst_late_s
+    return f"{played.frames} frames, {played.rate_hz:.1f} per second, at worst {late_ms:.1f} ms late"
+
+
+def take_frames(take: Take) -> Iterator[BodyFrame]:
+    """A take as the frames a tracker would have sent."""
+    tracks = {name: (track.poses.tolist(), track.tracked.tolist()) for name, track in take.bodies.items()}
+    for k, t_s in enumerate(take.time_s.tolist()):
+        bodies = [
+            BodySample(None, name, tuple(poses[k][:3]), tuple(poses[k][3:]), tracked[k])
+            for name, (poses, tracked) in tracks.items()
+        ]
+        yield BodyFrame(t_s, k, tuple(bodies), t_s, f"take:{take.name}")
+
+
+def resample(take: Take, rate_hz: float) -> Take:
+    """The take at another rate, without its fingers: lerp, slerp; tracked where both neighbours are."""
+    if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
+        raise TakeError(f"--rate is {rate_hz}; allowed are {RATES_HZ[0]} to {RATES_HZ[1]} Hz")
+    begin_s, end_s = take.time_s[0], take.time_s[-1]
+    time_s = begin_s + np.arange(int((end_s - begin_s) * rate_hz + 1e-6) + 1) / rate_hz
+    before = np.clip(np.searchsorted(take.time_s, time_s, side="right") - 1, 0, max(len(take.time_s) - 2, 0))
+    after = np.minimum(before + 1, len(take.time_s) - 1)
+    gap_s = np.where(after > before, take.time_s[after] - take.time_s[before], 1.0)
+    share = np.clip((time_s - take.time_s[before]) / gap_s, 0.0, 1.0)
+    bodies = {name: _between(track, before, after, share) for name, track in take.bodies.items()}
+    return Take(take.name, rate_hz, time_s, bodies)
+
+
+def _between(track: BodyTrack, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> BodyTrack:
+    a, b = track.poses[before], track.poses[after]
+    p = a[:, :3] + share[:, None] * (b[:, :3] - a[:, :3])
+    q = quat_slerp(a[:, 3:], b[:, 3:], share)
+    tracked = (track.tracked[before] | (share == 1.0)) & (track.tracked[after] | (share == 0.0))
+    return BodyTrack(np.concatenate([p, q], axis=1), tracked)
+
+
+def _occasionally(show: Callable[[Played], None]) -> Callable[[Played], None]:
+    """Call `show` a few times a second: drawing must not make frames late."""
+    shown_s = float("-inf")
+
+    def shown(played: Played) -> None:
+        nonlocal shown_s
+        now_s = time.monotonic()
+        if now_s - shown_s >= SHOW_S:
+            shown_s = now_s
+            show(played)
+
+    return shown

@@ -1,0 +1,116 @@
+"""`manipnet evaluate`: roll-outs on held-out takes, beside captured fingers and hands without a network."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from manipnet.synthesis.model.bundle import Bundle, load_bundle
+from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.synthesizer import SolverName
+from manipnet_tools.evaluation import report
+from manipnet_tools.evaluation.cases import data_folders, load_cases
+from manipnet_tools.evaluation.results import (
+    Fold,
+    Protocol,
+    row_name,
+)
+from manipnet_tools.evaluation.roll_outs import evaluate, folds
+
+Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
+
+
+@dataclass(frozen=True)
+class EvaluateOptions:
+    """Judge models on the dataset's takes: tables in the terminal, and JSON and plots where asked for."""
+
+    data: Path
+    """The dataset's folder, with BVH/ and meshes/."""
+    model: tuple[str, ...] = (DEFAULT_MODEL,)
+    """For --protocol seen: bundles trained on the first 80 % of every take, by shipped name or folder."""
+    models_dir: tuple[Path, ...] = (Path("unseen"),)
+    """For --protocol unseen: folders of bundles, each bundle named by the take left out of its training. Those that
+    are missing are trained, which takes long, and kept there."""
+    protocol: Protocol = "seen"
+    """seen: the last 20 % of every take. unseen: every take with a model that has not seen its object."""
+    solver: tuple[SolverName, ...] = ("least_squares", "none")
+    """Solvers to test each model with."""
+    takes: tuple[str, ...] = ()
+    """Test only these takes; all by default."""
+    sweep: Sweep | None = None
+    """Instead: how the last 20 % bears noise, a shorter look-ahead, other meshes, other sizes, ten minutes."""
+    json: Path | None = None
+    """Write every figure to this file."""
+    plots: Path | None = None
+    """Write plots and pictures of the worst frames into this folder."""
+
+
+def run(options: EvaluateOptions) -> None:
+    """Evaluate, print the tables, write what was asked for. Raises `DataError` and `BundleError`."""
+    console = Console()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console) as progress:
+        if options.sweep:
+            content, shown = _sweep(options, options.sweep, progress)
+        else:
+            content, shown = _protocol(options, progress)
+    for table in shown:
+        console.print(table)
+    if options.json:
+        options.json.write_text(json.dumps(content, indent=1))
+
+
+def _protocol(options: EvaluateOptions, progress: Progress) -> tuple[dict[str, Any], list[Table]]:
+    models = _models(options)
+    cases = load_cases(options.data)
+    takes = [folder.name for folder in data_folders(options.data, options.takes)]
+    tests = folds(cases, options.protocol, takes)
+    results = evaluate(tests, options.protocol, models, options.solver, progress)
+    ours = row_name(next(iter(models)), options.solver[0])
+    if options.plots:
+        from manipnet_tools.evaluation import plots
+
+        for path in progress.track(list(plots.write_all(results, ours, options.plots)), description="plots"):
+            progress.console.print(f"wrote {path}")
+    return report.as_json(results, ours), list(report.tables(results, ours))
+
+
+def _sweep(options: EvaluateOptions, name: Sweep, progress: Progress) -> tuple[dict[str, Any], list[Table]]:
+    from manipnet_tools.evaluation import sweeps
+
+    bundle = load_bundle(options.model[0])
+    subjects = sweeps.load_subjects(options.data, options.takes)
+    task = progress.add_task(name, total=sweeps.hand_ticks(name, subjects))
+    steps = sweeps.sweep(name, subjects, bundle, options.solver[0], lambda n: progress.advance(task, n))
+    rows = dict(steps)
+    if options.plots:
+        from manipnet_tools.evaluation import plots
+
+        progress.console.print(f"wrote {plots.write_sweep(name, rows, options.plots)}")
+    title = f"{name}: {row_name(bundle.name, options.solver[0])}, last 20 % of {len(subjects)} takes"
+    return {"sweep": name, "rows": report.plain(rows)}, [report.table_of(title, rows)]
+
+
+def _models(options: EvaluateOptions) -> dict[str, Callable[[Fold], Bundle]]:
+    if options.protocol == "seen":
+        bundles = [load_bundle(model) for model in options.model]
+        return {bundle.name: lambda fold, bundle=bundle: bundle for bundle in bundles}
+    return {
+        folder.name: lambda fold, folder=folder: _left_out(folder / fold.name, fold, options.data)
+        for folder in options.models_dir
+    }
+
+
+def _left_out(folder: Path, fold: Fold, data: Path) -> Bundle:
+    """The bundle of a fold, trained first if it is not there."""
+    if not (folder / "bundle.json").is_file():
+        from manipnet_tools.training import dataset, train
+
+        tracks = dataset.load_tracks(data, [case.name for case in fold.train])
+        train.save_bundle(train.train(tracks, train.TrainConfig()), folder)
+    return load_bundle(folder)

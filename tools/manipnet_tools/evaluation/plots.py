@@ -1,0 +1,156 @@
+"""Plots of an evaluation: error over time, contact strips, pictures of the worst frames."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from manipnet import geometry
+from manipnet.geometry import Array
+from manipnet.synthesis.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, JOINT_NAMES
+from manipnet.synthesis.synthesizer import Side
+from manipnet_tools.evaluation import metrics
+from manipnet_tools.evaluation.cases import Case
+from manipnet_tools.rendering import (
+    CERAMIC,
+    SKIN_RIGHT,
+    Camera,
+    Image,
+    Solid,
+    beads,
+    contact_sheet,
+    render,
+    rods,
+    save_png,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from manipnet_tools.evaluation.results import Results
+    from manipnet_tools.evaluation.scoring import Score
+
+PRESSED = (0.78, 0.16, 0.12)
+CAPSULE_NAMES = [
+    f"{'PALM to ' if start == 0 else ''}{JOINT_NAMES[end if start == 0 else start]}".lower().replace("_", " ")
+    for start, end in CAPSULE_JOINTS
+]
+PICTURE = (420, 420)
+
+
+def write_all(results: "Results", ours: str, folder: Path) -> Iterator[Path]:
+    """Write every plot into `folder`, made if needed, and name each file when it is there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for case in results.cases.values():
+        hands = {name: row.hands[case.name] for name, row in results.rows.items()}
+        for kind, figure in (
+            ("error", _error_over_time(case, {k: v for k, v in hands.items() if v is not case.captured})),
+            ("contacts", _contact_strips(case, hands[ours])),
+        ):
+            path = folder / f"{results.protocol}-{case.name}-{kind}.png"
+            figure.savefig(path, dpi=110)
+            yield path
+    path = folder / f"{results.protocol}-worst-frames.png"
+    save_png(_worst_frames(results, ours), path)
+    yield path
+
+
+def write_sweep(name: str, rows: "dict[str, Score]", folder: Path) -> Path:
+    """Joint error and contacts at every step of a sweep, as `sweep-NAME.png` in `folder`, made if needed."""
+    from matplotlib.figure import Figure
+
+    folder.mkdir(parents=True, exist_ok=True)
+    figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+    errors, contacts = figure.subplots(1, 2)
+    for label, measure in (("all joints", "mpjpe_mm"), ("near the object", "near_mm"), ("fingertips", "tip_mm")):
+        errors.plot(list(rows), [getattr(score, measure) for score in rows.values()], marker="o", label=label)
+    contacts.plot(list(rows), [score.contact_f1 for score in rows.values()], marker="o", color="tab:green")
+    for axes, what in ((errors, "error, mm"), (contacts, "contact F1")):
+        axes.set_ylabel(what)
+        axes.set_ylim(bottom=0.0)
+        axes.set_xlabel(name)
+        axes.tick_params(axis="x", rotation=30)
+        axes.grid(alpha=0.3)
+    errors.legend()
+    path = folder / f"sweep-{name}.png"
+    figure.savefig(path, dpi=110)
+    return path
+
+
+def _figure(case: Case, height: float) -> "tuple[Figure, list[tuple[Side, Axes]]]":
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13.0, height), layout="constrained")
+    axes = figure.subplots(len(case.captured), 1, sharex=True)
+    axes[-1].set_xlabel("time, s")
+    return figure, list(zip(case.captured, axes, strict=True))
+
+
+def _error_over_time(case: Case, rows: dict[str, dict[Side, Array]]) -> "Figure":
+    figure, panels = _figure(case, 6.0)
+    time = case.ticks.time_s
+    for side, axes in panels:
+        near = metrics.near(case.gaps[side])
+        axes.fill_between(time, 0, 1, where=near.tolist(), transform=axes.get_xaxis_transform(), color="0.92")
+        for name, hands in rows.items():
+            axes.plot(time, 1e3 * metrics.joint_error_m(hands[side], case.captured[side]), lw=0.9, label=name)
+        axes.set(
+            title=f"{case.name}, {side} hand (shaded: near the object)",
+            ylabel="joint error, mm",
+            ylim=(0, None),
+        )
+    panels[0][1].legend(loc="upper right", fontsize="small", ncols=len(rows))
+    return figure
+
+
+def _contact_strips(case: Case, hands: dict[Side, Array]) -> "Figure":
+    """Per capsule and frame: grey where both touch, orange where only the captured, blue where only ours."""
+    figure, panels = _figure(case, 8.0)
+    colors = np.array([(1, 1, 1), (0.95, 0.6, 0.1), (0.15, 0.45, 0.85), (0.55, 0.55, 0.55)])
+    for side, axes in panels:
+        captured = case.gaps[side].gap < metrics.CONTACT_M
+        ours = case.gaps_of(side, hands[side]).gap < metrics.CONTACT_M
+        time = case.ticks.time_s
+        axes.imshow(
+            colors[captured.T + 2 * ours.T],
+            aspect="auto",
+            interpolation="nearest",
+            extent=(time[0], time[-1], len(CAPSULE_NAMES) - 0.5, -0.5),
+        )
+        axes.set_yticks(range(len(CAPSULE_NAMES)), CAPSULE_NAMES, fontsize=7)
+        axes.set_title(f"{case.name}, {side} hand: grey both touch, orange only captured, blue only synthesised")
+    return figure
+
+
+def _worst_frames(results: "Results", ours: str) -> Image:
+    """Of every take and hand the frame near the object with the largest joint error: captured, then ours."""
+    pictures: list[Image] = []
+    for case in results.cases.values():
+        for side, positions in results.rows[ours].hands[case.name].items():
+            error = metrics.joint_error_m(positions, case.captured[side])
+            error[~(metrics.near(case.gaps[side]) & metrics.settled(len(case)))] = 0.0
+            frame = int(error.argmax())
+            if error[frame] > 0.0:
+                pictures += [_picture(case, side, hand[frame], frame) for hand in (case.captured[side], positions)]
+    return contact_sheet(pictures, columns=4)
+
+
+def _picture(case: Case, side: Side, positions: Array, frame: int) -> Image:
+    """A hand's capsules on the object, those in contact red, seen from the thumb side."""
+    T_wrist_object = geometry.compose(
+        geometry.invert(case.ticks.bodies[f"{side}_wrist"].poses[frame]), case.T_world_object[frame]
+    )
+    vertices = geometry.transform(T_wrist_object, case.shape.mesh.vertices)
+    faces = case.shape.mesh.faces.astype(np.int64)
+    if side == "left":
+        vertices, faces = geometry.mirror_points(vertices), faces[:, ::-1]
+    touches = case[frame : frame + 1].gaps_of(side, positions[None]).gap[0] < metrics.CONTACT_M
+    solids = [Solid(vertices, faces, CERAMIC)]
+    for capsule, (start, end) in enumerate(CAPSULE_JOINTS):
+        radius, color = CAPSULE_RADII_M[capsule], PRESSED if touches[capsule] else SKIN_RIGHT
+        ends = positions[[start, end]]
+        solids += [rods(ends[:1], ends[1:], radius, color), beads(ends, radius, color)]
+    view = Camera.orbit(np.array([0.1, 0.0, -0.03]), 0.5, azimuth=np.radians(160), elevation=np.radians(25))
+    return render(solids, view, PICTURE)

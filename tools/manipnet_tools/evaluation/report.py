@@ -1,0 +1,120 @@
+"""Results of an evaluation as tables and as JSON."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from manipnet_tools.evaluation.scoring import TARGETS, Score
+from manipnet_tools.takes.rollout import SIDES
+
+if TYPE_CHECKING:
+    from manipnet_tools.evaluation.results import Results
+
+MEASURES = {
+    "ratio": ("error ratio, near", "{:.2f}", 1.0),
+    "near_mm": ("error near, mm", "{:.1f}", 1.0),
+    "mpjpe_mm": ("MPJPE, mm", "{:.1f}", 1.0),
+    "tip_mm": ("fingertips, mm", "{:.1f}", 1.0),
+    "drift_s": ("longest drift, s", "{:.1f}", 1.0),
+    "contact_f1": ("contact F1", "{:.2f}", 1.0),
+    "penetration_cm": ("penetration, cm", "{:.3f}", 1.0),
+    "over_1cm": ("over 1 cm deep, %", "{:.1f}", 100.0),
+    "deep": ("deep frames, %", "{:.1f}", 100.0),
+    "slide_mm_s": ("sliding tips, mm/s", "{:.0f}", 1.0),
+    "smoothness": ("smoothness, cm/s²", "{:.0f}", 1.0),
+    "smoothness_ratio": ("smoothness ratio", "{:.2f}", 1.0),
+    "idle_ratio": ("idle ratio", "{:.2f}", 1.0),
+    "physics": ("physics, %", "{:.1f}", 100.0),
+    "physics_paper": ("paper's physics, %", "{:.1f}", 100.0),
+}
+"""Of each measure: label, format, factor."""
+MAX_COLUMNS = 8
+
+
+def tables(results: "Results", ours: str) -> Iterator[Table]:
+    """Averages of every row, the row `ours` against its targets, and `ours` per take and hand."""
+    averages = {name: row.average for name, row in results.rows.items()}
+    yield table_of(f"{results.protocol}: averages over takes and both hands", averages)
+    yield _verdicts(results, ours)
+    for side in SIDES:
+        takes = {take: sides[side] for take, sides in results.rows[ours].scores.items()}
+        yield table_of(f"{results.protocol}: {ours}, {side} hand", takes)
+
+
+def table_of(title: str, scores: dict[str, Score]) -> Table:
+    """One column per score, evenly thinned where there are many, one line per measure."""
+    names = list(scores)
+    names = names[:: -(-len(names) // MAX_COLUMNS)]
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False)
+    table.add_column("", no_wrap=True)
+    for name in names:
+        table.add_column(name, justify="right")
+    for measure, (label, form, factor) in MEASURES.items():
+        table.add_row(label, *(_cell(getattr(scores[name], measure), form, factor) for name in names))
+    return table
+
+
+def _cell(value: float, form: str, factor: float) -> str:
+    return form.format(factor * value) if math.isfinite(value) else "-"
+
+
+def _verdicts(results: "Results", ours: str) -> Table:
+    table = Table(
+        "target", "bound", ours, "verdict", title=f"{results.protocol}: targets", title_justify="left", box=SIMPLE_HEAD
+    )
+    for verdict in verdicts(results, ours):
+        met = "[green]met[/green]" if verdict["met"] else "[red]missed[/red]"
+        table.add_row(verdict["text"], verdict["target"], f"{verdict['value']:.3f}", met)
+    return table
+
+
+def verdicts(results: "Results", ours: str) -> list[dict[str, Any]]:
+    """Each target of the protocol with the value of the row `ours` and whether it is met."""
+    from manipnet_tools.evaluation.results import CAPTURED
+
+    score, captured = results.rows[ours].average, results.rows[CAPTURED].average
+    return [
+        {
+            "measure": target.measure,
+            "text": target.text,
+            "target": _bounds(target.low, target.high),
+            "value": target.value(score, captured),
+            "met": target.met(score, captured),
+        }
+        for target in TARGETS[results.protocol]
+    ]
+
+
+def _bounds(low: float, high: float) -> str:
+    if low in (0.0, -math.inf):
+        return f"≤ {high:g}"
+    return f"≥ {low:g}" if high in (1.0, math.inf) else f"{low:g} to {high:g}"
+
+
+def as_json(results: "Results", ours: str) -> dict[str, Any]:
+    """Everything measured; null where a case has no frames of a kind."""
+    return {
+        "protocol": results.protocol,
+        "ours": ours,
+        "verdicts": verdicts(results, ours),
+        "rows": {
+            name: {
+                "average": plain(row.average),
+                "takes": {take: plain(sides) for take, sides in row.scores.items()},
+            }
+            for name, row in results.rows.items()
+        },
+    }
+
+
+def plain(value: Any) -> Any:
+    """Scores as dictionaries, not-a-number as null."""
+    if isinstance(value, Score):
+        value = asdict(value)
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,192 @@
+"""What an export writes: hands and objects over time, from wherever fingers come from."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from manipnet.geometry import Array, mirror_points, quat_conjugate, quat_multiply, quat_rotate
+from manipnet.recording.mcap_file import read_hands
+from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_COUNT, OFFSETS_M, PARENTS
+from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
+from manipnet.synthesis.synthesizer import Side
+from manipnet.wire import SIDES, HandsMessage
+from manipnet_tools.takes.meshes import recorded_meshes
+from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
+
+TICK_HZ = 60.0
+PAUSE_S = 10.0
+"""A recording whose sender's time jumps back, or on by more than this, goes on with another performance."""
+_BONE_PARENTS = PARENTS[1:BONE_COUNT]
+
+
+class ExportError(ValueError):
+    """Something that cannot be exported; the text says why and what to do."""
+
+
+@dataclass(frozen=True)
+class HandTrack:
+    """One hand of `T` frames; a left one as it is, not mirrored."""
+
+    wrist: Array
+    """`(T, 7)` in the world."""
+    rotations: Array
+    """`(T, 17, 4)`: the wrist's in the world, every other bone's in its parent bone."""
+    offsets: Array
+    """`(22, 3)` of each joint in its parent bone, metres."""
+    live: np.ndarray
+    """`(T,)` false where the hand was held or at rest because tracking was lost."""
+
+    @property
+    def scale(self) -> float:
+        """Size over the model's hand."""
+        return float(np.linalg.norm(self.offsets) / np.linalg.norm(OFFSETS_M))
+
+    def world(self) -> tuple[Array, Array]:
+        """Joints `(T, 22, 3)` and bone rotations `(T, 17, 4)` in the world."""
+        positions, rotations = np.empty((len(self.wrist), JOINT_COUNT, 3)), self.rotations.copy()
+        positions[:, 0] = self.wrist[:, :3]
+        for joint, parent in enumerate(PARENTS[1:], start=1):
+            positions[:, joint] = positions[:, parent] + quat_rotate(rotations[:, parent], self.offsets[joint])
+            if joint < BONE_COUNT:
+                rotations[:, joint] = quat_multiply(rotations[:, parent], self.rotations[:, joint])
+        return positions, rotations
+
+
+@dataclass(frozen=True)
+class Performance:
+    """Hands by side and objects by name at `time_s (T,)`, right-handed, Y up, metres."""
+
+    name: str
+    rate_hz: float
+    time_s: Array
+    hands: dict[Side, HandTrack]
+    objects: dict[str, BodyTrack] = field(default_factory=dict)
+    meshes: dict[str, ClosedMesh] = field(default_factory=dict)
+    """Of those objects whose shape is known."""
+
+
+def read_performance(path: Path, actor: str | None = None) -> Performance:
+    """Fingers from a recording (of one `actor`, the first by default), the file of `manipnet synthesize`, or a take.
+
+    Raises `ExportError`, `TakeError`, `RecordingError` and `MeshError`.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        return _read_synthesised(path)
+    if suffix == ".mcap" and path.is_file():
+        return _read_recording(path, actor)
+    take = read_take(path)
+    if not take.fingers:
+        raise _no_fingers(path, take.objects)
+    hands: dict[Side, HandTrack] = {
+        side: hand_track(take.fingers[side].positions, take.fingers[side].rotations) for side in SIDES
+    }
+    return Performance(take.name, take.rate_hz, take.time_s, hands, {name: take.bodies[name] for name in take.objects})
+
+
+def hand_track(positions: Array, rotations: Array) -> HandTrack:
+    """A track from joints `(T, 22, 3)` and bone rotations `(T, 17, 4)` in the world."""
+    local = rotations.copy()
+    local[:, 1:] = quat_multiply(quat_conjugate(rotations[:, _BONE_PARENTS]), rotations[:, 1:])
+    offsets = np.zeros((JOINT_COUNT, 3))
+    parents = PARENTS[1:]
+    along = positions[:, 1:] - positions[:, parents]
+    offsets[1:] = np.median(quat_rotate(quat_conjugate(rotations[:, parents]), along), axis=0)
+    wrist = np.concatenate([positions[:, 0], rotations[:, 0]], axis=1)
+    return HandTrack(wrist, local, offsets, np.ones(len(wrist), dtype=np.bool_))
+
+
+def _no_fingers(path: Path, objects: Iterable[str]) -> ExportError:
+    mesh = next(iter(objects), "NAME")
+    return ExportError(
+        f"{path}: holds no fingers; make them first: manipnet synthesize {path} --mesh {mesh}=FILE --out fingers.npz, "
+        "then export fingers.npz"
+    )
+
+
+def _read_synthesised(path: Path) -> Performance:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = dict(file)
+        time_s = arrays["time"]
+        hands: dict[Side, HandTrack] = {
+            side: hand_track(arrays[f"{side}_positions"], arrays[f"{side}_rotations"]) for side in SIDES
+        }
+    except OSError as error:
+        raise ExportError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (KeyError, ValueError, BadZipFile) as error:
+        raise ExportError(f"{path}: is no file of `manipnet synthesize` ({error}); make it again") from None
+    seen = np.ones(len(time_s), dtype=np.bool_)
+    objects, meshes = {}, {}
+    for k, name in enumerate(arrays.get("objects", np.empty(0, str)).tolist()):
+        objects[name] = BodyTrack(arrays["object_poses"][k], seen)
+        if f"object_{k}_faces" in arrays:
+            meshes[name] = closed_mesh(arrays[f"object_{k}_vertices"], arrays[f"object_{k}_faces"], name)
+    return Performance(path.stem, TICK_HZ, time_s, hands, objects, meshes)
+
+
+def _read_recording(path: Path, actor: str | None) -> Performance:
+    messages = list(read_hands(path))
+    actors = dict.fromkeys(message.actor for message in messages)
+    if not messages:
+        raise _no_fingers(path, read_take(path).objects)
+    if actor is not None and actor not in actors:
+        raise ExportError(f"{path}: no actor {actor!r}; it has {', '.join(actors)}")
+    run = _longest_run([message for message in messages if message.actor == (actor or next(iter(actors)))])
+    ticks = np.array([round((message.t_capture - run[0].t_capture) * TICK_HZ) for message in run])
+    rows = {tick: message for tick, message in zip(ticks.tolist(), run, strict=True)}
+    frames = [rows.get(tick) for tick in range(ticks[-1] + 1)]
+    hands: dict[Side, HandTrack] = {
+        side: track for side in SIDES if (track := _recorded_hand(frames, side)) is not None
+    }
+    if not hands:
+        raise ExportError(f"{path}: its hands messages hold no hand; was a wrist tracked?")
+    names = dict.fromkeys(body.name for message in run for body in message.bodies if not body.name.endswith("_wrist"))
+    objects = {name: _recorded_body(frames, name) for name in names}
+    meshes = {name: mesh for name, mesh in recorded_meshes(path).items() if name in objects}
+    return Performance(path.stem, TICK_HZ, np.arange(len(frames)) / TICK_HZ, hands, objects, meshes)
+
+
+def _longest_run(messages: list[HandsMessage]) -> list[HandsMessage]:
+    runs = [messages[:1]]
+    for before, message in pairwise(messages):
+        step_s = message.t_capture - before.t_capture
+        if before.session != message.session or not -1.0 / TICK_HZ < step_s < PAUSE_S:
+            runs.append([])
+        runs[-1].append(message)
+    return max(runs, key=len)
+
+
+def _recorded_hand(frames: list[HandsMessage | None], side: Side) -> HandTrack | None:
+    poses = [None if message is None else message.hands.get(side) for message in frames]
+    there = np.array([pose is not None for pose in poses])
+    if not there.any():
+        return None
+    shown = [poses[k] for k in last_tracked(there)]
+    hands = [hand for hand in shown if hand is not None]
+    rotations = np.stack([hand.rotations for hand in hands])
+    wrist = np.stack([hand.wrist for hand in hands])
+    rotations[:, 0] = wrist[:, 3:]
+    scale = float(np.median([hand.scale for hand in hands]))
+    offsets = scale * (OFFSETS_M if side == "right" else mirror_points(OFFSETS_M))
+    live = there & np.array([hand.state == "live" for hand in hands])
+    return HandTrack(wrist, rotations, offsets, live)
+
+
+def _recorded_body(frames: list[HandsMessage | None], name: str) -> BodyTrack:
+    bodies = [next((b for b in message.bodies if b.name == name), None) if message else None for message in frames]
+    there = np.array([body is not None for body in bodies])
+    poses = np.stack([body.pose if body is not None else np.zeros(7) for body in bodies])[last_tracked(there)]
+    return BodyTrack(poses, np.array([body is not None and body.tracked for body in bodies]))
+
+
+def with_meshes(performance: Performance, meshes: Mapping[str, ClosedMesh]) -> Performance:
+    """The same with these `meshes` instead of those it knew. Raises `ExportError` for an object it does not have."""
+    if unknown := meshes.keys() - performance.objects.keys():
+        have = ", ".join(performance.objects) or "none"
+        raise ExportError(f"--mesh {min(unknown)}=…: {performance.name} has the objects {have}")
+    return replace(performance, meshes=performance.meshes | dict(meshes))

@@ -1,0 +1,192 @@
+"""ManipNet as a torch module (paper, section 6.2), with its normalisation inside, and its export to ONNX."""
+
+import io
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import torch
+from torch import nn
+
+from manipnet.synthesis.model.layout import ENCODED, INPUT, INPUT_SIZE, OUTPUT, OUTPUT_SIZE, PRESENT
+
+Architecture = Literal["manipnet", "resnet", "mlp"]
+
+_INPUT_FLOORS = {
+    "joint_positions": 2e-3,
+    "joint_axes": 2e-2,
+    "wrist_positions": 5e-3,
+    "wrist_axes": 2e-2,
+    "other_wrist_distances": 1e-2,
+    "object_centers": 5e-3,
+    "object_angular_velocities": 0.2,
+    "ambient": 5e-2,
+    "proximity": 5e-3,
+    "signed_distances": 3e-3,
+    "surface_normals": 5e-2,
+}
+_OUTPUT_FLOORS = {"joint_positions": 2e-3, "joint_axes": 2e-2, "distances": 2e-3}
+_CHANGE_FLOORS = {"joint_positions": 2e-4, "joint_axes": 2e-3, "distances": 2e-3}
+
+
+@dataclass(frozen=True)
+class Normalisation:
+    """Mean and standard deviation of every column; deviations have a floor, or columns that hardly move would
+    amplify noise a thousandfold."""
+
+    input_mean: np.ndarray
+    input_std: np.ndarray
+    output_mean: np.ndarray
+    output_std: np.ndarray
+    carries_pose: bool
+    """Whether the output statistics are of the change since the pose that went in."""
+
+
+def normalisation(inputs: np.ndarray, outputs: np.ndarray, carries_pose: bool) -> Normalisation:
+    """Statistics of samples `(N, 2356)` and `(N, 220)`."""
+    if carries_pose:
+        outputs = outputs.copy()
+        outputs[:, _POSE] -= inputs[:, _POSE]
+    floors = _CHANGE_FLOORS if carries_pose else _OUTPUT_FLOORS
+    return Normalisation(
+        *_statistics(inputs, _floors(INPUT, _INPUT_FLOORS, INPUT_SIZE)),
+        *_statistics(outputs, _floors(OUTPUT, floors, OUTPUT_SIZE)),
+        carries_pose,
+    )
+
+
+def _statistics(values: np.ndarray, floors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    std = np.maximum(values.std(axis=0, dtype=np.float64), floors)
+    return values.mean(axis=0, dtype=np.float64).astype(np.float32), std.astype(np.float32)
+
+
+def _floors(layout, floors, size) -> np.ndarray:
+    columns = np.empty(size)
+    for name, block in layout.items():
+        columns[block.columns] = floors[name]
+    return columns
+
+
+_FUTURE = {
+    **dict.fromkeys(
+        ("wrist_positions", "wrist_axes", "other_wrist_distances", "object_centers", "object_angular_velocities"),
+        PRESENT + 3,
+    ),
+    "proximity": 2,
+    "signed_distances": 2,
+}
+"""First row of each block that lies more than 0.1 s ahead."""
+_POSE = ENCODED["pose"]
+_ENCODED_SIZES = [columns.stop - columns.start for columns in ENCODED.values()]
+
+
+def hidden_columns(names: Sequence[str]) -> np.ndarray:
+    """Which of the 2356 inputs are meant by block names, or by `future` (what lies more than 0.1 s ahead)."""
+    mask = np.zeros(INPUT_SIZE, dtype=np.bool_)
+    for name in names:
+        if name == "future":
+            for block, first in _FUTURE.items():
+                rows = np.arange(INPUT_SIZE)[INPUT[block].columns].reshape(INPUT[block].shape)
+                mask[rows[first:].ravel()] = True
+        else:
+            mask[INPUT[name].columns] = True
+    return mask
+
+
+class ResidualDenseBlock(nn.Module):
+    """`a = relu(x); h = W a + b + a; c = relu(h); y = V c + d + c + a`; `dense=False` leaves out the long path."""
+
+    def __init__(self, width: int, dropout: float, dense: bool = True, residual: bool = True) -> None:
+        super().__init__()
+        self.first, self.second = nn.Linear(width, width), nn.Linear(width, width)
+        self.dropout, self.dense, self.residual = nn.Dropout(dropout), dense, residual
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """`(N, width)` to `(N, width)`."""
+        a = torch.relu(x)
+        h = self.first(self.dropout(a)) + (a if self.dense else 0.0)
+        c = torch.relu(h)
+        y = self.second(self.dropout(c)) + (c if self.dense else 0.0)
+        return y + a if self.residual else y
+
+
+class ManipNet(nn.Module):
+    """The network: three linear encoders, two residual dense blocks, a linear decoder. SI units in and out."""
+
+    input_mean: torch.Tensor
+    input_gain: torch.Tensor
+    output_mean: torch.Tensor
+    output_std: torch.Tensor
+
+    def __init__(
+        self,
+        norm: Normalisation,
+        width: int = 1536,
+        dropout: float = 0.3,
+        architecture: Architecture = "manipnet",
+        hidden: Sequence[str] = (),
+    ) -> None:
+        """`hidden` names inputs the network is not to see: blocks of the layout, or `future` beyond 0.1 s."""
+        super().__init__()
+        for name in ("input_mean", "output_mean", "output_std"):
+            self.register_buffer(name, torch.from_numpy(getattr(norm, name).copy()))
+        gain = 1.0 / norm.input_std
+        gain[hidden_columns(hidden)] = 0.0
+        self.register_buffer("input_gain", torch.from_numpy(gain))
+        self.carries_pose = norm.carries_pose
+        third = width // 3
+        self.encoders = nn.ModuleList(nn.Linear(s.stop - s.start, third) for s in ENCODED.values())
+        dense, residual = architecture == "manipnet", architecture != "mlp"
+        self.blocks = nn.Sequential(*(ResidualDenseBlock(3 * third, dropout, dense, residual) for _ in range(2)))
+        self.decoder = nn.Linear(3 * third, OUTPUT_SIZE)
+        self.dropout = nn.Dropout(dropout)
+        for layer in self.modules():
+            if isinstance(layer, nn.Linear):
+                nn.init.xavier_uniform_(layer.weight)
+                nn.init.zeros_(layer.bias)
+
+    def normalised(self, features: torch.Tensor) -> torch.Tensor:
+        """Outputs in standard deviations from their mean, which is what the loss sees."""
+        x = (features - self.input_mean) * self.input_gain
+        parts = [
+            encode(self.dropout(part))
+            for encode, part in zip(self.encoders, torch.split(x, _ENCODED_SIZES, dim=1), strict=True)
+        ]
+        return self.decoder(self.dropout(self.blocks(torch.cat(parts, dim=1))))
+
+    def normalise_outputs(self, features: torch.Tensor, outputs: torch.Tensor) -> torch.Tensor:
+        """What `normalised` should have answered."""
+        return (outputs - self._carried(features) - self.output_mean) / self.output_std
+
+    def forward(self, features: torch.Tensor) -> torch.Tensor:
+        """Features `(N, 2356)` to outputs `(N, 220)`."""
+        return self.normalised(features) * self.output_std + self.output_mean + self._carried(features)
+
+    def _carried(self, features: torch.Tensor) -> torch.Tensor:
+        pose, _, _ = torch.split(features, _ENCODED_SIZES, dim=1)
+        if not self.carries_pose:
+            pose = torch.zeros_like(pose)
+        return torch.nn.functional.pad(pose, (0, OUTPUT_SIZE - _ENCODED_SIZES[0]))
+
+
+def export_onnx(model: ManipNet) -> bytes:
+    """The model as ONNX with dynamic batch, `features` in and `outputs` out, weights in single precision."""
+    model = model.eval().float()
+    buffer = io.BytesIO()
+    with torch.no_grad(), warnings.catch_warnings():
+        # the older exporter is chosen on purpose: it needs no further package
+        warnings.simplefilter("ignore", DeprecationWarning)
+        warnings.filterwarnings("ignore", "Constant folding")
+        torch.onnx.export(
+            model,
+            (torch.zeros(2, INPUT_SIZE),),
+            buffer,  # pyright: ignore[reportArgumentType]: the older exporter takes files
+            dynamo=False,
+            input_names=["features"],
+            output_names=["outputs"],
+            dynamic_axes={"features": {0: "hands"}, "outputs": {0: "hands"}},
+            opset_version=17,
+        )
+    return buffer.getvalue()
