@@ -4,9 +4,9 @@ import numpy as np
 from compiled import call
 from numba import types
 
-from manipnet.jit import inner, on_stack
+from manipnet.jit import inner, stack_array
 
-_square, _pair, _counts = on_stack(3, 3), on_stack(2), on_stack(4, dtype=types.int32)
+_square, _pair, _counts = stack_array(3, 3), stack_array(2), stack_array(4, dtype=types.int32)
 
 
 @inner

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from manipnet.runtime.console import Terminal
+from manipnet.runtime.console import Console
 from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.runtime.status import SilenceWatch
 from manipnet.telemetry import LABELS, Counters, RateLimit, Timings
@@ -89,7 +89,7 @@ def test_a_line_that_repeats_is_held_back_and_summed_up() -> None:
 
 
 def test_a_log_line_as_json_has_its_parts(capsys: pytest.CaptureFixture[str]) -> None:
-    terminal = Terminal(as_json=True)
+    terminal = Console(as_json=True)
     for dropped in (3, 4):
         terminal.handle(logging.LogRecord("manipnet.x", logging.WARNING, __file__, 1, "lost %d\n", (dropped,), None))
     try:

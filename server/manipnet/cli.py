@@ -98,20 +98,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments.print_config:
         return _print_config(arguments)
     # The libraries behind these take a second to load: --help and a mistyped option should not.
-    from manipnet.runtime.precompile import Helper
+    from manipnet.runtime.precompile import Precompiler
 
-    helper = Helper()
+    helper = Precompiler()
     helper.start()
     from manipnet.config.settings import ConfigError
     from manipnet.net.curve_keys import KeyFileError
     from manipnet.net.errors import ListenError
-    from manipnet.runtime.console import Terminal
+    from manipnet.runtime.console import Console
     from manipnet.server import Server
     from manipnet.synthesis.model.bundle import BundleError
     from manipnet.synthesis.objects.mesh import MeshError
 
     stop = _stop_on_signals()
-    terminal = Terminal(as_json=arguments.log_format == "json")
+    terminal = Console(as_json=arguments.log_format == "json")
     logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
     if not helper.idle:
         logging.getLogger(__name__).warning("first start here: some 15 s go by while code is compiled, once")

@@ -31,7 +31,7 @@ inner = njit(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=Tru
 the compiling."""
 
 
-def on_stack(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
+def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
     """A function for kernels that gives an array of this shape to work in, unfilled and gone when they return.
 
     One place for each call in the source, so an array made in a loop is the same one every time round.
@@ -58,7 +58,7 @@ def on_stack(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
     return room
 
 
-matrix, vector = on_stack(3, 3), on_stack(3)
+matrix, vector = stack_array(3, 3), stack_array(3)
 """Room for a rotation, and for a point or direction."""
 
 COMPILED = ("geometry.py", "synthesis", "tracking")

@@ -14,9 +14,9 @@ from manipnet import __version__
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, ConfigError, ServerConfig, check
-from manipnet.control.actors_proxy import Cast
-from manipnet.control.calibration_requests import Placing
-from manipnet.control.peers import Surroundings
+from manipnet.control.actors_proxy import ActorsProxy
+from manipnet.control.calibration_requests import CalibrationRequests
+from manipnet.control.peers import Peers
 from manipnet.control.request import Handler
 from manipnet.control.service import Control
 from manipnet.control.session_requests import Requests
@@ -31,7 +31,7 @@ from manipnet.recording.recorder import Recorder, carried
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.mesh_watch import MeshWatch
-from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.prometheus import MetricsPage
 from manipnet.runtime.status import SilenceWatch, second_line
 from manipnet.runtime.tick_loop import TickLoop
@@ -79,8 +79,8 @@ class Server:
         self.session = secrets.token_hex(8)
         self.counters, self.timings = Counters(), Timings()
         self._mailbox, self._watch = Mailbox(self.counters), SilenceWatch()
-        self._wardrobe = Wardrobe(config.objects, config.objects_unit)
-        self._around = Surroundings(self._mailbox.put)
+        self._catalog = ObjectCatalog(config.objects, config.objects_unit)
+        self._around = Peers(self._mailbox.put)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model, config.provider)
         pose_a_hand(self._bundle)
@@ -94,7 +94,7 @@ class Server:
 
         Raises `ListenError` for an address that is taken, and `ConfigError` for a receiver nobody knows.
         """
-        shapes = self._wardrobe.shapes() or [self._wardrobe.shape(WARM_UP_SHAPE)]
+        shapes = self._catalog.shapes() or [self._catalog.shape(WARM_UP_SHAPE)]
         warm_up(self._bundle, shapes)
         with ExitStack() as opened:
             loop, addresses = self._open(opened)
@@ -110,15 +110,15 @@ class Server:
     def _open(self, opened: ExitStack) -> tuple[TickLoop, dict[str, str]]:
         """Every socket, and the loop between them; `opened` closes them in reverse order."""
         config, counters = self._config, self.counters
-        cast = Cast(self._actors, self._mailbox)
-        recorder = Recorder(config.takes, lambda: self._about(cast), counters)
+        actors_proxy = ActorsProxy(self._actors, self._mailbox)
+        recorder = Recorder(config.takes, lambda: self._about(actors_proxy), counters)
         opened.callback(recorder.stop)
         publisher = Publisher(config, counters, self._keys, recorder.note)
         opened.callback(publisher.close)
-        meshes = MeshWatch(self._wardrobe, lambda old, new: cast.ask(lambda: self._reshape(old, new)))
+        meshes = MeshWatch(self._catalog, lambda old, new: actors_proxy.ask(lambda: self._reshape(old, new)))
         opened.callback(meshes.stop)
         meshes.start()
-        handlers = {**self._handlers(cast), **recorder.handlers()}
+        handlers = {**self._handlers(actors_proxy), **recorder.handlers()}
         handlers |= self._around.handlers(handlers["status"])
         control = Control(config.host, config.control_port, handlers, counters, self._keys)
         opened.callback(control.stop)
@@ -165,25 +165,25 @@ class Server:
             page,
         )
 
-    def _handlers(self, cast: Cast) -> dict[str, Handler]:
+    def _handlers(self, actors_proxy: ActorsProxy) -> dict[str, Handler]:
         requests = Requests(
             self.session,
             self._bundle.name,
             self._bundle.model_hash,
-            cast,
-            self._wardrobe,
+            actors_proxy,
+            self._catalog,
             self.counters,
             self.timings,
         )
-        return {**requests.handlers(), **Placing(cast, self._config.rig).handlers()}
+        return {**requests.handlers(), **CalibrationRequests(actors_proxy, self._config.rig).handlers()}
 
     def _reshape(self, old: Shape, new: Shape) -> None:
         for actor in self._actors:
             actor.reshape(old, new)
 
-    def _about(self, cast: Cast) -> tuple[dict[str, str], list[Prop]]:
+    def _about(self, actors_proxy: ActorsProxy) -> tuple[dict[str, str], list[Prop]]:
         """What a recording depends on."""
-        props = cast.ask(lambda: [prop for actor in self._actors for prop in actor.props])
+        props = actors_proxy.ask(lambda: [prop for actor in self._actors for prop in actor.props])
         bundle, rig = self._bundle, self._config.rig
         about = {"session": self.session, "version": __version__, "model": bundle.name, "model_hash": bundle.model_hash}
         about["objects"] = carried(props)
@@ -219,7 +219,7 @@ class Server:
         return Demo()
 
     def _actor(self, config: ActorConfig) -> Actor:
-        props = [self._wardrobe.load(thing) for thing in config.objects]
+        props = [self._catalog.load(thing) for thing in config.objects]
         return Actor(config, props, self._bundle, self.counters, self._config.look_ahead_s)
 
     def _listen(self, opened: ExitStack, option: str, receiver: Receiver) -> str:

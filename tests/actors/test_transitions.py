@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipnet.actors.output_guard import MAX_SPEED_RAD_S, MAX_WRIST_RAD_S, NotFiniteError, OutputGuard
-from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, Presence, Shown, State, state_at_age
+from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, Shown, State, state_at_age
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
 from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
 from manipnet.telemetry import Counters
@@ -20,11 +20,13 @@ HERE = np.array([0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0])
 THERE = np.concatenate([[0.6, 1.2, -0.3], quat_exp(np.array([0.0, 1.5, 0.3]))])
 
 
-def presence() -> Presence:
-    return Presence(REST, OutputGuard(DOF_LIMITS_RAD, Counters()))
+def presence() -> PoseTransition:
+    return PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, Counters()))
 
 
-def run(hand: Presence, ticks: int, state: State, angles, wrist, run: int = 0, held: object = "mug") -> list[Shown]:
+def run(
+    hand: PoseTransition, ticks: int, state: State, angles, wrist, run: int = 0, held: object = "mug"
+) -> list[Shown]:
     shown = [hand.show(state, angles, wrist, run, held, TICK_S) for _ in range(ticks)]
     return [each for each in shown if each is not None]
 
@@ -151,7 +153,7 @@ def test_the_first_pose_shown_is_inside_the_limits_too() -> None:
 
 def test_angles_outside_the_limits_or_too_fast_are_kept_in_and_counted() -> None:
     counters = Counters()
-    hand = Presence(REST, OutputGuard(DOF_LIMITS_RAD, counters))
+    hand = PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, counters))
     run(hand, 1, "live", DOF_LIMITS_RAD[:, 0], HERE)
     (shown,) = run(hand, 1, "live", FIST + 1.0, HERE)
     steps = shown.angles - DOF_LIMITS_RAD[:, 0]

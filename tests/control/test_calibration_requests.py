@@ -11,8 +11,8 @@ import pytest
 from manipnet.actors.actor import Actor
 from manipnet.actors.calibration import difference, wrist_on_sheet
 from manipnet.config.rig_reader import load_rig
-from manipnet.control.actors_proxy import Cast
-from manipnet.control.calibration_requests import Placing
+from manipnet.control.actors_proxy import ActorsProxy
+from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.request import RequestError
 from manipnet.geometry import compose, invert, quat_exp
 from manipnet.runtime.mailbox import Mailbox
@@ -34,7 +34,7 @@ def rig(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def cast(rig: Path) -> Iterator[Cast]:
+def actors_proxy(rig: Path) -> Iterator[ActorsProxy]:
     bundle = SimpleNamespace(rest_angles=np.zeros(DOF_COUNT), limits=DOF_LIMITS_RAD)
     mailbox, stop = Mailbox(Counters()), threading.Event()
 
@@ -44,12 +44,12 @@ def cast(rig: Path) -> Iterator[Cast]:
 
     thread = threading.Thread(target=tick)
     thread.start()
-    yield Cast([Actor(load_rig(rig).actors[0], [], bundle, Counters(), 0.0)], mailbox)  # pyright: ignore
+    yield ActorsProxy([Actor(load_rig(rig).actors[0], [], bundle, Counters(), 0.0)], mailbox)  # pyright: ignore
     stop.set()
     thread.join()
 
 
-def show(cast: Cast, drift_m_s: float = 0.0) -> None:
+def show(actors_proxy: ActorsProxy, drift_m_s: float = 0.0) -> None:
     """Both hands on a sheet at the origin for the two seconds before now."""
     rng = np.random.default_rng(1)
     for i in range(-2 * SEEN_HZ - 30, 1):
@@ -58,17 +58,19 @@ def show(cast: Cast, drift_m_s: float = 0.0) -> None:
             pose = compose(wrist_on_sheet(side), invert(CLUSTER))
             p = pose[:3] + rng.normal(0.0, 5e-4, 3) + [drift_m_s * i / SEEN_HZ, 0.0, 0.0]
             samples.append(BodySample(None, f"{side}_wrist", tuple(p), tuple(pose[3:]), True))
-        cast.actors[0].push(BodyFrame(10.0 + i / SEEN_HZ, i, tuple(samples), NOW_S + i / SEEN_HZ, "zmq:test"))
+        actors_proxy.actors[0].push(BodyFrame(10.0 + i / SEEN_HZ, i, tuple(samples), NOW_S + i / SEEN_HZ, "zmq:test"))
 
 
-def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(cast: Cast, rig: Path) -> None:
-    calibrate = Placing(cast, rig, lambda: NOW_S).handlers()["calibrate"]
-    show(cast)
+def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(
+    actors_proxy: ActorsProxy, rig: Path
+) -> None:
+    calibrate = CalibrationRequests(actors_proxy, rig, lambda: NOW_S).handlers()["calibrate"]
+    show(actors_proxy)
     answer = calibrate({"op": "calibrate"})
     assert answer["stored"] == str(rig)
     for side in ("left", "right"):
         part = f"{side}_wrist"
-        for offset in (cast.actors[0].offset(part), load_rig(rig).actors[0].wrists[part].offset):
+        for offset in (actors_proxy.actors[0].offset(part), load_rig(rig).actors[0].wrists[part].offset):
             away_m, away_rad = difference(offset, CLUSTER)
             assert away_m < 1e-3
             assert away_rad < np.radians(0.5)
@@ -78,16 +80,16 @@ def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(ca
     assert set(again["hands"]) == {"left_wrist"}
 
 
-def test_a_hand_that_moved_changes_nothing(cast: Cast, rig: Path) -> None:
-    show(cast, drift_m_s=0.01)
+def test_a_hand_that_moved_changes_nothing(actors_proxy: ActorsProxy, rig: Path) -> None:
+    show(actors_proxy, drift_m_s=0.01)
     with pytest.raises(RequestError, match=r"left_wrist moved .* lay the hand down and try again"):
-        Placing(cast, rig, lambda: NOW_S).handlers()["calibrate"]({"op": "calibrate"})
+        CalibrationRequests(actors_proxy, rig, lambda: NOW_S).handlers()["calibrate"]({"op": "calibrate"})
     assert rig.read_text(encoding="utf-8") == RIG
-    assert np.array_equal(cast.actors[0].offset("left_wrist"), [0, 0, 0, 0, 0, 0, 1])
+    assert np.array_equal(actors_proxy.actors[0].offset("left_wrist"), [0, 0, 0, 0, 0, 0, 1])
 
 
-def test_without_a_rig_file_it_lasts_until_the_server_stops(cast: Cast) -> None:
-    show(cast)
-    answer = Placing(cast, None, lambda: NOW_S).handlers()["calibrate"]({"op": "calibrate"})
+def test_without_a_rig_file_it_lasts_until_the_server_stops(actors_proxy: ActorsProxy) -> None:
+    show(actors_proxy)
+    answer = CalibrationRequests(actors_proxy, None, lambda: NOW_S).handlers()["calibrate"]({"op": "calibrate"})
     assert answer["stored"] is None
     assert "started without --rig" in answer["note"]

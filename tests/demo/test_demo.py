@@ -14,7 +14,7 @@ from manipnet.demo.player import DEMO_FILE, DEMO_OBJECTS, Demo, connectable, dem
 from manipnet.inputs.zeromq import ZmqBodies
 from manipnet.recording.mcap_file import RecordingWriter, read_bodies
 from manipnet.telemetry import Counters
-from manipnet.tracking.outlier_gate import BodyGate
+from manipnet.tracking.outlier_gate import OutlierGate
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 
@@ -48,7 +48,7 @@ def test_the_performance_ends_as_it_begins() -> None:
 
 
 def test_a_prop_that_lies_still_in_every_loop_is_never_taken_for_frozen() -> None:
-    frames, gate = list(read_bodies(DEMO_FILE)), BodyGate()
+    frames, gate = list(read_bodies(DEMO_FILE)), OutlierGate()
     period_s = frames[-1].t_s + frames[1].t_s - 2.0 * frames[0].t_s
     for loop in range(10):
         for frame in frames:

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from manipnet.inputs.sender_stats import CLOCK_S, MOST, RATE_S, Senders
+from manipnet.inputs.sender_stats import CLOCK_S, MOST, RATE_S, SenderStats
 from manipnet.wire.bodies import BodyFrame
 
 
@@ -22,7 +22,7 @@ def passed():
 
 @pytest.fixture
 def senders(passed):
-    return Senders(passed.append)
+    return SenderStats(passed.append)
 
 
 def test_every_frame_is_handed_on_and_counted(senders, passed):

@@ -10,8 +10,8 @@ import pytest
 import zmq
 
 from manipnet.inputs.zeromq import ZmqBodies
-from manipnet.net import access_control as gatekeeper
-from manipnet.net.access_control import Gatekeeper
+from manipnet.net import access_control as access
+from manipnet.net.access_control import AccessControl
 from manipnet.net.connection_limits import MAX_UNDELIVERED_BYTES, SMALL_TALK_BYTES, Connections
 from manipnet.net.zmq_socket import MAX_WIRE_BYTES
 from manipnet.telemetry import Counters
@@ -28,7 +28,7 @@ class Door:
         self.pub = self.context.socket(zmq.XPUB)  # which tells when a subscription has come
         self.pub.setsockopt(zmq.LINGER, 0)
         self.pub.setsockopt(zmq.XPUB_VERBOSE, 1)
-        self.keeper = Gatekeeper(self.context, self.pub, self.counters, most=MOST)
+        self.keeper = AccessControl(self.context, self.pub, self.counters, most=MOST)
         self.pub.bind("tcp://127.0.0.1:0")
         self.address = self.pub.getsockopt_string(zmq.LAST_ENDPOINT)
 
@@ -114,7 +114,7 @@ def test_one_too_many_is_turned_away_counted_and_let_in_when_there_is_room(door)
 
 
 def test_who_does_not_speak_zeromq_is_counted_and_who_does_is_not(monkeypatch):
-    monkeypatch.setattr(gatekeeper, "HANDSHAKE_MS", 200)
+    monkeypatch.setattr(access, "HANDSHAKE_MS", 200)
     door = Door()
     with zmq.Context() as context, subscribe(context, door), knock(door.address) as browser:
         browser.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n")

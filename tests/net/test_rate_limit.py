@@ -1,10 +1,10 @@
 """The guard against floods, with a clock that is stepped by hand."""
 
-from manipnet.net.rate_limit import FAULTS_PER_S, MAX_SOURCES, STRANGERS_PER_S, Pace, SourceGuard
+from manipnet.net.rate_limit import FAULTS_PER_S, MAX_SOURCES, STRANGERS_PER_S, SourceRateLimiter, Throttle
 
 
 def test_a_known_source_passes_through_any_flood():
-    guard = SourceGuard()
+    guard = SourceRateLimiter()
     assert guard.admits("good", 0.0)
     guard.good("good")
     admitted = sum(guard.admits(f"stranger {n}", 0.5) for n in range(50_000))
@@ -13,7 +13,7 @@ def test_a_known_source_passes_through_any_flood():
 
 
 def test_one_loud_stranger_leaves_room_for_another():
-    guard = SourceGuard()
+    guard = SourceRateLimiter()
     for _ in range(50_000):
         if guard.admits("loud", 0.1):
             guard.bad("loud")
@@ -21,7 +21,7 @@ def test_one_loud_stranger_leaves_room_for_another():
 
 
 def test_the_budget_is_new_each_second():
-    guard = SourceGuard()
+    guard = SourceRateLimiter()
     for _ in range(2 * FAULTS_PER_S):
         if guard.admits("loud", 0.0):
             guard.bad("loud")
@@ -30,7 +30,7 @@ def test_the_budget_is_new_each_second():
 
 
 def test_a_known_source_that_turns_bad_is_a_stranger_again():
-    guard = SourceGuard()
+    guard = SourceRateLimiter()
     guard.good("relay")
     for _ in range(FAULTS_PER_S):
         assert guard.admits("relay", 0.0)
@@ -42,7 +42,7 @@ def test_a_known_source_that_turns_bad_is_a_stranger_again():
 
 
 def test_an_occasional_fault_is_forgiven():
-    guard = SourceGuard()
+    guard = SourceRateLimiter()
     guard.good("relay")
     for second in range(10 * FAULTS_PER_S):
         assert guard.admits("relay", float(second))
@@ -50,7 +50,7 @@ def test_an_occasional_fault_is_forgiven():
 
 
 def test_memory_is_bounded():
-    guard = SourceGuard()
+    guard = SourceRateLimiter()
     for n in range(10 * MAX_SOURCES):
         guard.good(n)
         guard.bad(-n)
@@ -59,7 +59,7 @@ def test_memory_is_bounded():
 
 
 def test_a_known_source_may_be_read_so_often_a_second_and_takes_nothing_from_others():
-    guard = SourceGuard(known_per_s=1_000)
+    guard = SourceRateLimiter(known_per_s=1_000)
     for source in ("mad", "sane"):
         guard.admits(source, 0.0)
         guard.good(source)
@@ -69,7 +69,7 @@ def test_a_known_source_may_be_read_so_often_a_second_and_takes_nothing_from_oth
 
 
 def test_a_pace_lets_a_burst_through_and_then_so_many_a_second():
-    pace, now = Pace(per_s=100, burst=10), 5.0
+    pace, now = Throttle(per_s=100, burst=10), 5.0
     assert [pace.delay_s(now) for _ in range(10)] == [0.0] * 10
     for _ in range(200):
         now += pace.delay_s(now)

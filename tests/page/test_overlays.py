@@ -17,7 +17,7 @@ from manipnet.page.sensor_snapshot import Senser
 from manipnet.page.supervisor import frame_of
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
-from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.synthesis.hand.surface import SENSOR_BONES, SENSOR_POINTS, SENSOR_WEIGHTS
 from manipnet.synthesis.model.bundle import load_bundle
@@ -32,10 +32,10 @@ HAND_SIZE, PROP_SIZE = 0.9, 1.3
 
 @pytest.fixture(scope="module")
 def prop() -> Prop:
-    return Prop("Box", "cube", Wardrobe().shape("cube"), PROP_SIZE)
+    return Prop("Box", "cube", ObjectCatalog().shape("cube"), PROP_SIZE)
 
 
-class Onlooker:
+class TickObserver:
     """Keeps every tick as the page would get it."""
 
     watched = True
@@ -53,9 +53,9 @@ def frames(prop: Prop, tiny_bundle: Path, tmp_path_factory: pytest.TempPathFacto
     bundle, counters, timings = load_bundle(tiny_bundle), Counters(), Timings()
     actor = Actor(replace(default_actor(), hand_scale=HAND_SIZE), [prop], bundle, counters, 0.1)
     actor.carry(prop.name, prop.object, prop.shape, prop.scale)
-    onlooker, mailbox = Onlooker(), Mailbox(counters)
+    observer, mailbox = TickObserver(), Mailbox(counters)
     recorder = FlightRecorder(tmp_path_factory.mktemp("dumps"))
-    rest = StageClock(timings), lambda message: None, mailbox, recorder, counters, timings, onlooker
+    rest = StageClock(timings), lambda message: None, mailbox, recorder, counters, timings, observer
     loop = TickLoop("session", [actor], Synthesizer(bundle), *rest)
     for k in range(180):
         bodies = (BodySample(None, str(n), tuple(p[:3]), tuple(p[3:]), True) for n, p in scene(k / 120).items() if p)
@@ -63,7 +63,7 @@ def frames(prop: Prop, tiny_bundle: Path, tmp_path_factory: pytest.TempPathFacto
         loop.take_in(0.0)
         while loop.step(k / 120):
             pass
-    return onlooker.frames[-30:]
+    return observer.frames[-30:]
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

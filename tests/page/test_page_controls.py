@@ -15,7 +15,7 @@ from live_server import LiveServer, Sender, Subscriber, serving
 
 from manipnet.actors.calibration import difference, sheet_at, wrist_on_sheet
 from manipnet.geometry import compose, invert, quat_exp
-from manipnet.page.overlays import LAYERS
+from manipnet.page.overlays import OVERLAYS
 from manipnet.recording.mcap_file import read_hands
 from manipnet.synthesis.synthesizer import Side
 from manipnet.wire import HandsMessage
@@ -125,12 +125,12 @@ def test_look_ahead_and_layers(studio: Studio) -> None:
     studio.page.type("Look-ahead, ms", "100")
     studio.until(lambda message: message.look_ahead == pytest.approx(0.1))
     studio.says("100 ms look-ahead")
-    for label in LAYERS.values():
+    for label in OVERLAYS.values():
         studio.page.tick(label)
     shown = studio.server.ask({"op": "status"})["counters"]["page_frames"]["shown"]
     while studio.server.ask({"op": "status"})["counters"]["page_frames"]["shown"] < shown + 10:
         studio.subscriber.next()
-    for label in LAYERS.values():
+    for label in OVERLAYS.values():
         studio.page.tick(label)
 
 

@@ -15,7 +15,7 @@ from simulated_link import Link, Weather
 from test_tick_loop import Bench, actor, frame
 
 from manipnet.actors.props import Prop
-from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.telemetry import Counters
 from manipnet.tracking.timeline import TICK_HZ, TICK_S
@@ -37,11 +37,11 @@ def bundle(tiny_bundle: Path) -> Bundle:
 @pytest.fixture
 def receive(bundle: Bundle, tmp_path: Path):
     """Plays the scene over a network; the messages of the settled part."""
-    shape = Wardrobe().shape("cube")
+    shape = ObjectCatalog().shape("cube")
 
     def run(arrive: Arrive, look_ahead_s: float) -> list[HandsMessage]:
         counters = Counters()
-        one = actor(bundle, Wardrobe(), counters, Prop("Box", "cube", shape))
+        one = actor(bundle, ObjectCatalog(), counters, Prop("Box", "cube", shape))
         one.timeline.look_ahead_s = look_ahead_s
         bench = Bench(bundle, tmp_path, [one], counters)
         sent = [i / RATE_HZ for i in range(round(SECONDS * RATE_HZ))]

@@ -13,7 +13,7 @@ from manipnet.actors.props import HYSTERESIS_M, Prop
 from manipnet.config.settings import BodyConfig, ObjectConfig, default_actor
 from manipnet.runtime import shape_process as workshop
 from manipnet.runtime.mesh_watch import MeshWatch
-from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.shape_process import make_shape
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.objects.library import library_names
@@ -54,72 +54,72 @@ def test_the_library_is_complete() -> None:
 
 
 def test_a_folder_adds_to_the_library_and_comes_before_it(folder: Path) -> None:
-    wardrobe = Wardrobe(folder, "cm")
-    assert set(wardrobe.names()) == LIBRARY
+    catalog = ObjectCatalog(folder, "cm")
+    assert set(catalog.names()) == LIBRARY
     box(folder / "crate.stl", 7.0)
     box(folder / "cube.obj", 9.0)
     (folder / "notes.txt").write_text("no mesh")
-    assert set(wardrobe.names()) == LIBRARY | {"crate"}, "without being told"
-    assert size_of(wardrobe.shape("crate")) == pytest.approx(0.07, abs=1e-6)
-    assert size_of(wardrobe.shape("cube")) == pytest.approx(0.09, abs=1e-6)
-    assert wardrobe.shape("crate") is wardrobe.shape("crate"), "built once"
+    assert set(catalog.names()) == LIBRARY | {"crate"}, "without being told"
+    assert size_of(catalog.shape("crate")) == pytest.approx(0.07, abs=1e-6)
+    assert size_of(catalog.shape("cube")) == pytest.approx(0.09, abs=1e-6)
+    assert catalog.shape("crate") is catalog.shape("crate"), "built once"
     with pytest.raises(MeshError, match="no object 'spoon'; there are bottle, bowl, crate, cube"):
-        wardrobe.shape("spoon")
+        catalog.shape("spoon")
 
 
 def test_a_rigs_mesh_comes_before_the_folders(folder: Path, tmp_path: Path) -> None:
     box(folder / "crate.stl", 0.05)
     box(tmp_path / "crate.stl", 0.08)
-    wardrobe = Wardrobe(folder)
-    prop = wardrobe.load(ObjectConfig("Box", BodyConfig("Box"), tmp_path / "crate.stl"))
-    assert wardrobe.shape("crate") is prop.shape
-    assert wardrobe.add(folder / "crate.stl") is wardrobe.shape("crate"), "what is brought in comes first"
+    catalog = ObjectCatalog(folder)
+    prop = catalog.load(ObjectConfig("Box", BodyConfig("Box"), tmp_path / "crate.stl"))
+    assert catalog.shape("crate") is prop.shape
+    assert catalog.add(folder / "crate.stl") is catalog.shape("crate"), "what is brought in comes first"
 
 
 def test_a_changed_file_is_built_again_once_nobody_writes_it_any_more(folder: Path) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
-    wardrobe = Wardrobe(folder)
-    old = wardrobe.shape("crate")
-    assert wardrobe.changed() == []
+    catalog = ObjectCatalog(folder)
+    old = catalog.shape("crate")
+    assert catalog.changed() == []
     box(path, 0.06)
-    assert wardrobe.changed() == [], "it may still be being written"
+    assert catalog.changed() == [], "it may still be being written"
     box(path, 0.07)
-    assert wardrobe.changed() == [], "it was"
-    ((before, after),) = wardrobe.changed()
+    assert catalog.changed() == [], "it was"
+    ((before, after),) = catalog.changed()
     assert before is old
     assert size_of(after) == pytest.approx(0.07, abs=1e-6)
-    assert wardrobe.shape("crate") is after
-    assert wardrobe.changed() == []
+    assert catalog.shape("crate") is after
+    assert catalog.changed() == []
     path.touch()
-    assert (wardrobe.changed(), wardrobe.changed()) == ([], []), "the same content is no change"
+    assert (catalog.changed(), catalog.changed()) == ([], []), "the same content is no change"
     path.unlink()
-    assert (wardrobe.changed(), wardrobe.changed()) == ([], [])
-    assert "crate" not in wardrobe.names()
+    assert (catalog.changed(), catalog.changed()) == ([], [])
+    assert "crate" not in catalog.names()
 
 
 @pytest.mark.parametrize("content", [b"", b"ply\nnonsense", b"solid x\nendsolid x\n"])
 def test_a_file_that_breaks_is_named_and_the_shape_stays(folder: Path, content: bytes, caplog) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
-    wardrobe = Wardrobe(folder)
-    old = wardrobe.shape("crate")
+    catalog = ObjectCatalog(folder)
+    old = catalog.shape("crate")
     path.write_bytes(content)
-    assert (wardrobe.changed(), wardrobe.changed()) == ([], [])
-    assert wardrobe.shape("crate") is old
-    assert str(path) in wardrobe.problems()["crate.ply"]
+    assert (catalog.changed(), catalog.changed()) == ([], [])
+    assert catalog.shape("crate") is old
+    assert str(path) in catalog.problems()["crate.ply"]
     assert "a mesh file has changed, but is not used" in caplog.text
     box(path, 0.06)
-    wardrobe.changed()
-    assert len(wardrobe.changed()) == 1
-    assert wardrobe.problems() == {}
+    catalog.changed()
+    assert len(catalog.changed()) == 1
+    assert catalog.problems() == {}
 
 
 def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     path, done, tries = folder / "crate.ply", threading.Event(), []
     box(path, 0.05)
-    wardrobe = Wardrobe(folder)
-    wardrobe.shape("crate")
+    catalog = ObjectCatalog(folder)
+    catalog.shape("crate")
 
     def swap(old, new) -> None:
         tries.append((old, new))
@@ -127,7 +127,7 @@ def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
             raise RuntimeError("busy")
         done.set()
 
-    watch = MeshWatch(wardrobe, swap)
+    watch = MeshWatch(catalog, swap)
     box(path, 0.06)
     watch.start()
     assert done.wait(60.0)
@@ -160,8 +160,8 @@ def bundle(tiny_bundle: Path) -> Bundle:
 class Scene:
     """An actor with two props, seen tick by tick."""
 
-    def __init__(self, bundle: Bundle, wardrobe: Wardrobe) -> None:
-        shape = wardrobe.shape("cube")
+    def __init__(self, bundle: Bundle, catalog: ObjectCatalog) -> None:
+        shape = catalog.shape("cube")
         self.actor = Actor(
             default_actor(), [Prop("cup", "cube", shape), Prop("pot", "cube", shape)], bundle, Counters(), 0.0
         )
@@ -185,9 +185,9 @@ class Scene:
 
 
 def test_two_objects_one_in_each_hand_at_the_same_time(bundle: Bundle) -> None:
-    wardrobe = Wardrobe()
-    scene = Scene(bundle, wardrobe)
-    scene.actor.carry("pot", "sphere", wardrobe.shape("sphere"), 1.5)
+    catalog = ObjectCatalog()
+    scene = Scene(bundle, catalog)
+    scene.actor.carry("pot", "sphere", catalog.shape("sphere"), 1.5)
     plan = scene.tick(left=-0.12, right=0.12)
     assert scene.held() == {"left": "cup", "right": "pot"}
     assert (plan.scenes["left"].shape.name, plan.scenes["left"].scale) == ("cube", 1.0)
@@ -195,7 +195,7 @@ def test_two_objects_one_in_each_hand_at_the_same_time(bundle: Bundle) -> None:
 
 
 def test_a_hand_turns_to_another_object_only_when_it_is_clearly_nearer(bundle: Bundle) -> None:
-    scene = Scene(bundle, Wardrobe())
+    scene = Scene(bundle, ObjectCatalog())
     palm = 0.09  # in front of a right wrist
     scene.tick(left=-1.0, right=-0.03 - palm)
     assert scene.held()["right"] == "cup"
@@ -213,14 +213,14 @@ def test_a_hand_turns_to_another_object_only_when_it_is_clearly_nearer(bundle: B
 def test_a_swapped_or_changed_shape_is_in_the_very_next_tick(bundle: Bundle, folder: Path) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
-    wardrobe = Wardrobe(folder)
-    scene = Scene(bundle, wardrobe)
+    catalog = ObjectCatalog(folder)
+    scene = Scene(bundle, catalog)
     assert scene.tick(-0.3, 0.1).scenes["right"].shape.name == "cube"
-    crate = wardrobe.shape("crate")
+    crate = catalog.shape("crate")
     scene.actor.carry("pot", "crate", crate, 1.0)
     assert scene.tick(-0.3, 0.1).scenes["right"].shape is crate
     box(path, 0.06)
-    watch = MeshWatch(wardrobe, scene.actor.reshape)
+    watch = MeshWatch(catalog, scene.actor.reshape)
     watch.look()
     watch.look()
     plan = scene.tick(-0.3, 0.1)
@@ -231,15 +231,15 @@ def test_a_swapped_or_changed_shape_is_in_the_very_next_tick(bundle: Bundle, fol
 def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> None:
     """No tick waits for a builder: it asks for nothing that a builder holds."""
     box(folder / "crate.ply", 0.05)
-    wardrobe = Wardrobe(folder)
-    scene = Scene(bundle, wardrobe)
-    with wardrobe._building:  # as if a huge mesh were being built
-        builder = threading.Thread(target=wardrobe.shape, args=("crate",))
+    catalog = ObjectCatalog(folder)
+    scene = Scene(bundle, catalog)
+    with catalog._building:  # as if a huge mesh were being built
+        builder = threading.Thread(target=catalog.shape, args=("crate",))
         builder.start()
         for _ in range(30):
             assert "right" in scene.tick(-0.3, 0.1).scenes
-        assert wardrobe.names()
-        assert wardrobe.problems() == {}
+        assert catalog.names()
+        assert catalog.problems() == {}
         assert builder.is_alive()
     builder.join()
-    assert "crate" in {shape.name for shape in wardrobe.shapes()}
+    assert "crate" in {shape.name for shape in catalog.shapes()}

@@ -13,7 +13,7 @@ def test_what_is_compiled_aside_is_found_in_the_cache() -> None:
 
 def test_a_start_with_a_full_cache_needs_no_help() -> None:
     first_start.compile_aside()
-    helper = first_start.Helper()
+    helper = first_start.Precompiler()
     helper.start()
     assert helper.idle
     helper.wait()

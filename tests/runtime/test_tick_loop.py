@@ -13,7 +13,7 @@ from manipnet.config.settings import WRISTS, ActorConfig, BodyConfig, ObjectConf
 from manipnet.geometry import quat_exp
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
-from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
@@ -31,8 +31,8 @@ def bundle(tiny_bundle: Path) -> Bundle:
 
 
 @pytest.fixture(scope="module")
-def wardrobe() -> Wardrobe:
-    return Wardrobe()
+def catalog() -> ObjectCatalog:
+    return ObjectCatalog()
 
 
 class Bench:
@@ -84,7 +84,7 @@ def frame(t_s: float, poses) -> BodyFrame:
     return BodyFrame(t_s, None, bodies, t_s, "zmq:bench")
 
 
-def actor(bundle: Bundle, wardrobe: Wardrobe, counters: Counters, *props: Prop, config=None) -> Actor:
+def actor(bundle: Bundle, catalog: ObjectCatalog, counters: Counters, *props: Prop, config=None) -> Actor:
     made = Actor(config or default_actor(), props, bundle, counters, 0.5)
     for prop in props:
         made.carry(prop.name, prop.object, prop.shape, prop.scale)
@@ -92,17 +92,17 @@ def actor(bundle: Bundle, wardrobe: Wardrobe, counters: Counters, *props: Prop, 
 
 
 @pytest.fixture
-def bench(bundle: Bundle, wardrobe: Wardrobe, tmp_path: Path):
+def bench(bundle: Bundle, catalog: ObjectCatalog, tmp_path: Path):
     counters = Counters()
     return Bench(
-        bundle, tmp_path, [actor(bundle, wardrobe, counters, Prop("Box", "cube", wardrobe.shape("cube")))], counters
+        bundle, tmp_path, [actor(bundle, catalog, counters, Prop("Box", "cube", catalog.shape("cube")))], counters
     )
 
 
-def test_each_hand_takes_the_prop_that_is_nearest_and_does_not_waver(bundle, wardrobe, tmp_path) -> None:
+def test_each_hand_takes_the_prop_that_is_nearest_and_does_not_waver(bundle, catalog, tmp_path) -> None:
     counters = Counters()
-    props = [Prop(name, "cube", wardrobe.shape("cube")) for name in ("cup", "pot")]
-    bench = Bench(bundle, tmp_path, [actor(bundle, wardrobe, counters, *props)], counters)
+    props = [Prop(name, "cube", catalog.shape("cube")) for name in ("cup", "pot")]
+    bench = Bench(bundle, tmp_path, [actor(bundle, catalog, counters, *props)], counters)
 
     def poses(t_s: float):
         wobble = 0.01 * np.sin(40.0 * t_s)  # two props, each hand near one of them, the left one in the middle
@@ -118,7 +118,7 @@ def test_each_hand_takes_the_prop_that_is_nearest_and_does_not_waver(bundle, war
     assert len({message.hands["left"].object for message in messages}) == 1
 
 
-def test_two_actors_are_told_apart_and_share_one_stream(bundle, wardrobe, tmp_path) -> None:
+def test_two_actors_are_told_apart_and_share_one_stream(bundle, catalog, tmp_path) -> None:
     counters = Counters()
     ann = ActorConfig("ann", {"left_wrist": BodyConfig(1), "right_wrist": BodyConfig("2")})
     bob = ActorConfig("bob", {"right_wrist": BodyConfig("bob")}, hand_scale=0.8)
@@ -126,8 +126,8 @@ def test_two_actors_are_told_apart_and_share_one_stream(bundle, wardrobe, tmp_pa
         bundle,
         tmp_path,
         [
-            actor(bundle, wardrobe, counters, Prop("box", "cube", wardrobe.shape("cube")), config=ann),
-            actor(bundle, wardrobe, counters, Prop("ball", "sphere", wardrobe.shape("sphere")), config=bob),
+            actor(bundle, catalog, counters, Prop("box", "cube", catalog.shape("cube")), config=ann),
+            actor(bundle, catalog, counters, Prop("ball", "sphere", catalog.shape("sphere")), config=bob),
         ],
         counters,
     )
@@ -152,11 +152,11 @@ def test_two_actors_are_told_apart_and_share_one_stream(bundle, wardrobe, tmp_pa
     assert knuckles == pytest.approx(0.8 * np.linalg.norm(anns.joints[12, :3] - anns.joints[1, :3]))
 
 
-def test_a_body_with_an_offset_is_where_the_offset_says(bundle, wardrobe, tmp_path) -> None:
+def test_a_body_with_an_offset_is_where_the_offset_says(bundle, catalog, tmp_path) -> None:
     turn = quat_exp(np.array([0.0, np.pi / 2, 0.0]))
     config = ActorConfig("a", {"right_wrist": BodyConfig(3, np.array([0.0, 0.0, 0.1, *turn]))})
     counters = Counters()
-    bench = Bench(bundle, tmp_path, [actor(bundle, wardrobe, counters, config=config)], counters)
+    bench = Bench(bundle, tmp_path, [actor(bundle, catalog, counters, config=config)], counters)
     (wrist,) = {tuple(m.hands["right"].wrist.round(6)) for m in bench.play(0.6, lambda _: {3: HERE})}
     assert wrist == pytest.approx((0.0, 0.0, 0.1, *turn), abs=1e-6)
 
@@ -180,10 +180,10 @@ class Faulty:
 
 @pytest.mark.parametrize("how", ["raise", "nan"])
 def test_an_internal_error_shows_the_last_good_pose_leaves_a_dump_and_goes_on(
-    bundle, wardrobe, tmp_path: Path, how: str
+    bundle, catalog, tmp_path: Path, how: str
 ) -> None:
     counters = Counters()
-    actors = [actor(bundle, wardrobe, counters, Prop("Box", "cube", wardrobe.shape("cube")))]
+    actors = [actor(bundle, catalog, counters, Prop("Box", "cube", catalog.shape("cube")))]
     bench = Bench(bundle, tmp_path, actors, counters, Faulty(bundle, {20, 21, 22}, how))
     messages = bench.play(1.5)
     assert [message.seq for message in messages] == list(range(60))
@@ -221,10 +221,10 @@ def test_a_message_that_cannot_be_published_is_counted_and_the_next_one_goes_out
     assert bench.counters.snapshot()["tick_errors"]["publish"] > 3
 
 
-def test_a_hand_smaller_than_the_models_sees_a_larger_world(bundle, wardrobe) -> None:
+def test_a_hand_smaller_than_the_models_sees_a_larger_world(bundle, catalog) -> None:
     config = ActorConfig("child", {wrist: BodyConfig(wrist) for wrist in WRISTS}, hand_scale=0.5)
     counters = Counters()
-    child = actor(bundle, wardrobe, counters, Prop("Box", "cube", wardrobe.shape("cube"), 0.7), config=config)
+    child = actor(bundle, catalog, counters, Prop("Box", "cube", catalog.shape("cube"), 0.7), config=config)
     for i in range(70):
         child.push(frame(i / 120, scene(i / 120)))
     tick = child.timeline.poll(1.0)
@@ -236,8 +236,8 @@ def test_a_hand_smaller_than_the_models_sees_a_larger_world(bundle, wardrobe) ->
 
 
 def test_the_same_mesh_is_built_once() -> None:
-    wardrobe = Wardrobe()
+    catalog = ObjectCatalog()
     cube = LIBRARY_FOLDER / "cube.ply"
-    one, other = (wardrobe.load(ObjectConfig(name, BodyConfig(name), cube)) for name in ("one", "other"))
+    one, other = (catalog.load(ObjectConfig(name, BodyConfig(name), cube)) for name in ("one", "other"))
     assert one.shape is other.shape
     assert (one.name, other.name, other.object) == ("one", "other", "cube")

@@ -16,7 +16,7 @@ from manipnet.actors.actor import ShownHand
 from manipnet.actors.hands_message import hand_poses
 from manipnet.actors.transitions import Shown
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.ik.pose import FELT_SHARE
+from manipnet.synthesis.ik.pose import FEEDBACK_SHARE
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.model.features import features
 from manipnet.synthesis.model.layout import INPUT, PRESENT
@@ -116,7 +116,7 @@ def test_the_next_tick_sees_part_of_the_correction(tiny_bundle: Path, tmp_path: 
     shapes = [build_shape(gourd(triangles), tmp_path) for triangles in (2000, 300)]
     synthesizer = Synthesizer(load_bundle(tiny_bundle))
     step = synthesizer.step(scenes_at(0, shapes), [synthesizer.rest_state()] * 3)[0]
-    predicted = (step.state.angles - FELT_SHARE * step.angles) / (1.0 - FELT_SHARE)
+    predicted = (step.state.angles - FEEDBACK_SHARE * step.angles) / (1.0 - FEEDBACK_SHARE)
     assert np.abs(step.angles - predicted).max() > 0.01, "the solver has work to do"
     np.testing.assert_allclose(forward_kinematics(predicted)[0], step.raw_positions, atol=1e-9)
     np.testing.assert_allclose(forward_kinematics(step.angles)[0], step.positions, atol=1e-9)

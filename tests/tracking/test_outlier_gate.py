@@ -10,7 +10,7 @@ import pytest
 
 from manipnet.inputs.natnet.frames import read_frame
 from manipnet.telemetry import BODY_REASONS
-from manipnet.tracking.outlier_gate import CONFIRM_S, FORGET_S, FROZEN_S, MAX_BODIES_KNOWN, BodyGate
+from manipnet.tracking.outlier_gate import CONFIRM_S, FORGET_S, FROZEN_S, MAX_BODIES_KNOWN, OutlierGate
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.takes.take import read_take
 
@@ -48,13 +48,13 @@ def shaking(seconds, start_s=0.0, amplitude_m=1e-5):
 
 def test_a_frame_without_fault_is_handed_on_as_it_is():
     one = frame(0.0, ("wrist", (0.0, 1.0, 0.0)))
-    assert BodyGate().check(one) == (one, [])
+    assert OutlierGate().check(one) == (one, [])
 
 
 @pytest.mark.parametrize("speed_m_s", [0.1, 5.0, 15.0])
 @pytest.mark.parametrize("rate_hz", [30, 120, 360])
 def test_fast_motion_is_no_jump(speed_m_s, rate_hz):
-    gate = BodyGate()
+    gate = OutlierGate()
     motion = [
         frame(n / rate_hz, ("wrist", (speed_m_s * n / rate_hz, 1, 0), turned(20 * 57 * n / rate_hz)))
         for n in range(rate_hz)
@@ -63,7 +63,7 @@ def test_fast_motion_is_no_jump(speed_m_s, rate_hz):
 
 
 def test_lost_frames_allow_a_longer_way():
-    gate = BodyGate()
+    gate = OutlierGate()
     assert faults(gate, [frame(0.0, ("wrist", (0, 1, 0))), frame(0.2, ("wrist", (2.0, 1, 0)))]) == [None, None]
 
 
@@ -71,13 +71,13 @@ def test_lost_frames_allow_a_longer_way():
     ("p", "q"), [((1.0, 1.5, 0.0), UNTURNED), ((1.0, 1.0, 0.0), turned(120)), ((9.0, 9.0, 9.0), turned(180))]
 )
 def test_one_wild_sample_is_left_out(p, q):
-    gate = BodyGate()
+    gate = OutlierGate()
     before, wild, after = still(0.1), frame(0.1, ("wrist", p, q)), still(0.1, start_s=0.1 + 1 / HZ)
     assert faults(gate, [*before, wild, *after]) == [None] * 12 + ["jump"] + [None] * 12
 
 
 def test_a_body_that_stays_where_it_jumped_to_is_believed_after_a_while():
-    gate = BodyGate()
+    gate = OutlierGate()
     faults(gate, still(0.1))
     result = faults(gate, still(0.5, p=(3.0, 1.0, 0.0), start_s=0.1))
     held = round(CONFIRM_S * HZ)
@@ -85,32 +85,32 @@ def test_a_body_that_stays_where_it_jumped_to_is_believed_after_a_while():
 
 
 def test_wild_samples_all_over_the_place_are_never_believed():
-    gate = BodyGate()
+    gate = OutlierGate()
     faults(gate, still(0.1))
     wild = [frame(0.1 + n / HZ, ("wrist", (50.0 * (n % 7) + 50, 1, 0))) for n in range(round((FORGET_S - 0.1) * HZ))]
     assert set(faults(gate, wild)) == {"jump"}
 
 
 def test_a_body_found_after_a_long_loss_is_taken_where_it_appears():
-    gate = BodyGate()
+    gate = OutlierGate()
     assert faults(gate, [*still(0.1), frame(5.0, ("wrist", (4.0, 1, 0)))])[-1] is None
 
 
 def test_a_restarted_sender_is_taken_where_it_appears():
-    gate = BodyGate()
+    gate = OutlierGate()
     faults(gate, still(0.5, start_s=100.0))
     assert faults(gate, [frame(0.0, ("wrist", (4.0, 1, 0)))]) == [None]
 
 
 def test_a_late_frame_is_judged_by_its_distance_in_time():
-    gate = BodyGate()
+    gate = OutlierGate()
     path = {n: frame(n / HZ, ("wrist", (5.0 * n / HZ, 1, 0))) for n in range(12)}
     order = [0, 1, 2, 5, 3, 4, 8, 7, 6, 9, 11, 10]
     assert set(faults(gate, [path[n] for n in order])) == {None}
 
 
 def test_two_bodies_that_swap_are_held_until_they_swap_back():
-    gate = BodyGate()
+    gate = OutlierGate()
     near, far = (0.0, 1.0, 0.0), (0.1, 1.0, 0.0)
 
     def pair(n, left, right):
@@ -124,21 +124,21 @@ def test_two_bodies_that_swap_are_held_until_they_swap_back():
 
 
 def test_two_bodies_that_pass_each_other_do_not_swap():
-    gate = BodyGate()
+    gate = OutlierGate()
     for n in range(HZ):
         x = 2.0 * (n / HZ - 0.5)
         assert not gate.check(frame(n / HZ, ("left", (x, 1.0, 0)), ("right", (-x, 1.02, 0))))[1]
 
 
 def test_zeros_are_never_believed_where_the_body_was_elsewhere():
-    gate = BodyGate()
+    gate = OutlierGate()
     assert set(faults(gate, still(0.5))) == {None}
     assert set(faults(gate, still(5.0, p=(0.0, 0.0, 0.0), start_s=0.5))) == {"zeros"}
     assert faults(gate, still(0.1, start_s=5.5))[0] is None
 
 
 def test_a_body_that_lives_at_the_origin_may_be_there():
-    gate = BodyGate()
+    gate = OutlierGate()
     assert set(faults(gate, still(2.0, p=(0.0, 0.0, 0.0)))) == {None}
 
 
@@ -149,7 +149,7 @@ def moving(frames):
 
 
 def test_a_tracked_body_that_freezes_is_noticed_and_comes_back():
-    gate = BodyGate()
+    gate = OutlierGate()
     assert set(faults(gate, moving(shaking(1.0)))) == {None}
     frozen = faults(gate, moving(still(3.0, start_s=1.0)))
     assert frozen.index("frozen") == pytest.approx(FROZEN_S * HZ, abs=2)
@@ -158,13 +158,13 @@ def test_a_tracked_body_that_freezes_is_noticed_and_comes_back():
 
 
 def test_where_everything_stands_still_nothing_is_frozen():
-    gate = BodyGate()
+    gate = OutlierGate()
     faults(gate, shaking(1.0))
     assert set(faults(gate, still(3.0, start_s=1.0))) == {None}
 
 
 def test_a_frozen_real_body_is_noticed():
-    gate = BodyGate()
+    gate = OutlierGate()
     frames = [read_frame(payload, (3, 0)) for payload in natnet_capture.frames()]
     live = [frame(f.timestamp_s, ("quad", f.bodies[0].p, f.bodies[0].q)) for f in frames]
     assert set(faults(gate, moving(live))) == {None}
@@ -173,7 +173,7 @@ def test_a_frozen_real_body_is_noticed():
 
 
 def test_a_computed_body_may_stand_still_for_ever():
-    gate = BodyGate()
+    gate = OutlierGate()
     glide = [frame(n / HZ, ("wrist", (0.5 - 0.5 * math.cos(n / HZ), 1.0, 0.0))) for n in range(4 * HZ)]
     assert set(faults(gate, moving([*glide, *still(3.0, glide[-1].bodies[0].p, 4.0)]))) == {None}
 
@@ -182,17 +182,17 @@ def test_faults_of_the_parser_are_counted():
     bad = BodySample(1, None, (0.0, 0.0, 0.0), UNTURNED, False, "nan")
     lost = BodySample(2, None, (0.0, 0.0, 0.0), UNTURNED, False)
     given = BodyFrame(0.0, None, (bad, lost), 0.0, "test")
-    assert BodyGate().check(given) == (given, ["nan"])
+    assert OutlierGate().check(given) == (given, ["nan"])
 
 
 def test_senders_and_bodies_are_judged_apart():
-    gate = BodyGate()
+    gate = OutlierGate()
     gate.check(frame(0.0, ("wrist", (0, 1, 0)), ("mug", (3, 1, 0))))
     assert not gate.check(frame(0.0, ("wrist", (9, 1, 0)), source="another"))[1]
 
 
 def test_memory_is_bounded():
-    gate = BodyGate()
+    gate = OutlierGate()
     for n in range(3 * MAX_BODIES_KNOWN):
         gate.check(frame(0.0, (f"body {n}", (0, 1, 0))))
     assert len(gate._memories) <= MAX_BODIES_KNOWN
@@ -206,7 +206,7 @@ def test_reasons_are_counted_ones():
 def test_nothing_is_rejected_in_real_takes(manipnet_data, rate_hz):
     for folder in sorted((manipnet_data / "BVH").iterdir()):
         take = read_take(folder)
-        gate = BodyGate()
+        gate = OutlierGate()
         for i in range(0, len(take.time_s), round(take.rate_hz / rate_hz)):
             bodies = [
                 (name, tuple(body.poses[i, :3].tolist()), tuple(body.poses[i, 3:].tolist()))
@@ -217,7 +217,7 @@ def test_nothing_is_rejected_in_real_takes(manipnet_data, rate_hz):
 
 def test_every_real_take_has_a_jump_when_two_bodies_swap_names(manipnet_data):
     take = read_take(next((manipnet_data / "BVH").iterdir()))
-    gate = BodyGate()
+    gate = OutlierGate()
     names = list(take.bodies)
     for i, swap in itertools.product([100], [False, True]):
         order = names[::-1] if swap else names

@@ -8,7 +8,7 @@ import numpy as np
 
 from manipnet.actors.output_guard import OutputGuard
 from manipnet.actors.props import Prop, choose_prop
-from manipnet.actors.transitions import HOLD_AFTER_S, Presence, Shown, State, state_at_age
+from manipnet.actors.transitions import HOLD_AFTER_S, PoseTransition, Shown, State, state_at_age
 from manipnet.config.settings import WRISTS, ActorConfig, BodyConfig, BodyKey
 from manipnet.geometry import Array, compose, invert
 from manipnet.synthesis.hand.skeleton import DOF_NAMES
@@ -34,7 +34,7 @@ class ShownHand:
     prop: str | None
 
 
-class Hand:
+class LiveHand:
     """One hand's memory: what it was synthesised to, what it shows, and which prop it is about."""
 
     def __init__(self, side: Side, rest_angles: Array, limits: Array, counters: Counters) -> None:
@@ -43,7 +43,7 @@ class Hand:
         self.resting = False
         """Asked to rest: no synthesis until the hand has eased there."""
         self._rest_angles = rest_angles
-        self._presence = Presence(rest_angles, OutputGuard(limits, counters))
+        self._presence = PoseTransition(rest_angles, OutputGuard(limits, counters))
         self.memory = state_of(rest_angles)
 
     @property
@@ -100,8 +100,8 @@ class Actor:
         """Asked to pause: both hands stay as they are shown, wherever the wrists go."""
         limits = _limits(config, bundle.limits)
         rest_angles = np.clip(bundle.rest_angles, *limits.T)
-        self.hands: dict[Side, Hand] = {
-            side: Hand(side, rest_angles, limits, counters) for side in SIDES if f"{side}_wrist" in config.wrists
+        self.hands: dict[Side, LiveHand] = {
+            side: LiveHand(side, rest_angles, limits, counters) for side in SIDES if f"{side}_wrist" in config.wrists
         }
         self._parts, self._offsets = _parts(config), _offsets(config)
         self._last: tuple[int, int] | None = None
@@ -225,7 +225,7 @@ class Actor:
         for hand in self.hands.values():
             hand.recover()
 
-    def _state(self, hand: Hand, wrist: BodyAtTick | None, thing: BodyAtTick | None) -> State:
+    def _state(self, hand: LiveHand, wrist: BodyAtTick | None, thing: BodyAtTick | None) -> State:
         if self.paused:
             return "hold"
         if hand.resting:

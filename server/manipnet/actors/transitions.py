@@ -42,7 +42,7 @@ class Shown:
     wrist: Array
 
 
-class Ease:
+class InertializationOffset:
     """The gap between what is shown and what should be: opened by a change of source, closed by a critically
     damped spring, so what is shown neither jumps nor overshoots."""
 
@@ -73,12 +73,12 @@ class Ease:
         return self.gap
 
 
-class Presence:
+class PoseTransition:
     """One hand as it is shown from tick to tick."""
 
     def __init__(self, rest_angles: Array, guard: OutputGuard) -> None:
         self._rest_angles, self._guard = rest_angles, guard
-        self._fingers, self._wrist = Ease(len(rest_angles)), Ease(6)
+        self._fingers, self._wrist = InertializationOffset(len(rest_angles)), InertializationOffset(6)
         self._finger_source: Hashable = None
         self._wrist_source: Hashable = None
         self._guessed = False

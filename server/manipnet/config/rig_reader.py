@@ -53,7 +53,7 @@ _KINDS = {str: "text", int: "an integer", float: "a number", bool: "true or fals
 _ACTOR_KEYS = ("bodies", "objects", "hand_scale", "limits_deg")
 _FOLDERS = ("keys", "objects", "takes", "dump_dir")
 """Keys of `[server]` that name folders, as the rig file sees them."""
-_NOBODY_ELSE = "[bodies]\nleft_wrist = 'left_wrist'\nright_wrist = 'right_wrist'\n"
+DEFAULT_ACTOR_TOML = "[bodies]\nleft_wrist = 'left_wrist'\nright_wrist = 'right_wrist'\n"
 """Who is expected when no file says otherwise."""
 _OFFSET_KEYS = ("body", "position", "rotation")
 
@@ -95,7 +95,7 @@ def parse_rig(
 ) -> Rig:
     """A rig from the text of its file, `where` names it in errors; relative paths start at `folder`. A mesh is found
     there or in the library, unless `find_mesh` says where it is."""
-    tree, places = read_tree(_NOBODY_ELSE if text is None else text, where, settings)
+    tree, places = read_tree(DEFAULT_ACTOR_TOML if text is None else text, where, settings)
     return _Reader(folder, where, places, find_mesh).rig(tree)
 
 

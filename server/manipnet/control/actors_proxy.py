@@ -10,7 +10,7 @@ from manipnet.runtime.mailbox import BusyError, Mailbox
 T = TypeVar("T")
 
 
-class Cast:
+class ActorsProxy:
     """The actors of a server as other threads may have them: between two ticks."""
 
     def __init__(self, actors: Sequence[Actor], mailbox: Mailbox) -> None:

@@ -14,7 +14,7 @@ from manipnet.actors.calibration import CalibrationError, Steady, steady_pose
 from manipnet.actors.transitions import HOLD_AFTER_S
 from manipnet.config.rig_writer import store
 from manipnet.config.settings import WRISTS, ConfigError
-from manipnet.control.actors_proxy import Cast, body_key
+from manipnet.control.actors_proxy import ActorsProxy, body_key
 from manipnet.control.request import Handler, Request, RequestError, choice, number
 from manipnet.control.session_requests import placement
 from manipnet.geometry import Array, compose, invert, quat_normalize
@@ -26,12 +26,14 @@ STEPS: Final = ("wrists", "fingertips")
 NOT_STORED: Final = "the server was started without --rig FILE: this lasts until it stops"
 
 
-class Placing:
+class CalibrationRequests:
     """The operations of `docs/calibration.md`."""
 
-    def __init__(self, cast: Cast, rig: Path | None, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, actors_proxy: ActorsProxy, rig: Path | None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """`rig` is the file the actors came from, if any; `clock` is the receivers'."""
-        self._cast, self._rig, self._clock = cast, rig, clock
+        self._proxy, self._rig, self._clock = actors_proxy, rig, clock
         self._backed_up = False
 
     def handlers(self) -> dict[str, Handler]:
@@ -39,14 +41,14 @@ class Placing:
         return {"calibrate": self._calibrate, "place_object": self._place_object}
 
     def _calibrate(self, request: Request) -> dict[str, Any]:
-        actor = self._cast.actor(request)
+        actor = self._proxy.actor(request)
         step = choice(request, "step", STEPS, default=STEPS[0])
         sides: list[Side] = [side for side in SIDES if side in actor.hands]
         wanted = choice(request, "hand", ("both", *sides), default="both")
         sides = [side for side in sides if wanted in ("both", side)]
         reference = None if request.get("reference") is None else self._reference(actor, request)
         scale = self._typed_scale(request, actor)
-        look = Look(self._cast, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
+        look = Look(self._proxy, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
         try:
             shown = look.at([*(f"{side}_wrist" for side in sides), *([reference] if reference else [])])
             sheet = self._sheet(request, actor, reference, shown)
@@ -103,9 +105,9 @@ class Placing:
         return calibration.sheet_at(np.array([x, y, z]), yaw)
 
     def _place_object(self, request: Request) -> dict[str, Any]:
-        actor = self._cast.actor(request)
+        actor = self._proxy.actor(request)
         body = body_key(request)
-        part = self._cast.ask(lambda: actor.part(body))
+        part = self._proxy.ask(lambda: actor.part(body))
         props = {prop.name: prop for prop in actor.props}
         if part not in props:
             allowed = ", ".join(props) or "none: select_object gives a body something to carry"
@@ -119,7 +121,7 @@ class Placing:
 
     def _on_sheet(self, request: Request, actor: Actor, part: str, lowest_m: float) -> Array:
         """Where an object sits on its body that stands upright in the middle of the sheet."""
-        look = Look(self._cast, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
+        look = Look(self._proxy, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
         try:
             body = look.at([part])[part]
         except CalibrationError as error:
@@ -137,7 +139,7 @@ class Placing:
             actor.resize_hands(scale)
             return before
 
-        return self._cast.ask(put)
+        return self._proxy.ask(put)
 
     def _keep(self, actor: Actor, request: Request) -> dict[str, Any]:
         """Write the rig file; what came of it, for the answer."""
@@ -156,12 +158,12 @@ class Placing:
 class Look:
     """A look back at what was tracked of an actor."""
 
-    def __init__(self, cast: Cast, actor: Actor, now_s: float, seconds: float) -> None:
-        self._cast, self._actor, self._now_s, self._seconds = cast, actor, now_s, seconds
+    def __init__(self, actors_proxy: ActorsProxy, actor: Actor, now_s: float, seconds: float) -> None:
+        self._proxy, self._actor, self._now_s, self._seconds = actors_proxy, actor, now_s, seconds
 
     def at(self, parts: Sequence[str]) -> dict[str, Steady]:
         """Each part's body as it was held still. Raises `CalibrationError` and `RequestError`."""
-        seen = self._cast.ask(lambda: [self._of(part) for part in parts])
+        seen = self._proxy.ask(lambda: [self._of(part) for part in parts])
         return {
             part: steady_pose(poses, part, rate_hz * self._seconds)
             for part, (poses, rate_hz) in zip(parts, seen, strict=True)

@@ -8,7 +8,7 @@ from typing import Any, Final
 from manipnet.control.request import Handler, Request, RequestError, number
 from manipnet.inputs.base import Sink
 from manipnet.inputs.natnet.client import STATES, NatNetBodies
-from manipnet.inputs.sender_stats import Senders
+from manipnet.inputs.sender_stats import SenderStats
 from manipnet.runtime.prometheus import Gauge
 from manipnet.wire.bodies import MessageError, check_name
 
@@ -16,11 +16,11 @@ MOST_CLOCKS: Final = 64
 MAX_OFFSET_S: Final = 1e10
 
 
-class Surroundings:
+class Peers:
     """Knows the sockets of one server. Its `sink` is where the receivers leave frames. From any thread."""
 
     def __init__(self, sink: Sink) -> None:
-        self.sink = Senders(sink)
+        self.sink = SenderStats(sink)
         self.motive: NatNetBodies | None = None
         self.connected: Callable[[], Mapping[str, int]] = dict
         """How many are connected at present, by socket."""

@@ -12,9 +12,9 @@ import zmq
 
 from manipnet.config.settings import is_loopback
 from manipnet.control.request import Handler, Request, RequestError, _show
-from manipnet.net.access_control import Gatekeeper
+from manipnet.net.access_control import AccessControl
 from manipnet.net.curve_keys import ServerKeys
-from manipnet.net.rate_limit import Pace
+from manipnet.net.rate_limit import Throttle
 from manipnet.net.zmq_socket import bind, zmq_endpoint
 from manipnet.telemetry import CONTROL_OPS, Counters
 
@@ -40,7 +40,7 @@ class Control:
         keys: ServerKeys | None = None,
     ) -> None:
         """Binds; raises `ListenError`. `start` begins to answer. With `keys` only clients on their list may ask."""
-        self._handlers, self._counters, self._pace = handlers, counters, Pace(REQUESTS_PER_S, BURST)
+        self._handlers, self._counters, self._throttle = handlers, counters, Throttle(REQUESTS_PER_S, BURST)
         endpoint, ipv6 = zmq_endpoint(host, port)
         self._context = zmq.Context()
         rep = self._context.socket(zmq.REP)
@@ -52,7 +52,7 @@ class Control:
         rep.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
         rep.setsockopt(zmq.IPV6, int(ipv6))
         try:
-            self._gatekeeper = Gatekeeper(self._context, rep, counters, keys)
+            self._access = AccessControl(self._context, rep, counters, keys)
             bind(rep, endpoint, "--control-port")
         except BaseException:
             rep.close()
@@ -76,15 +76,15 @@ class Control:
 
     def connected(self) -> int:
         """How many clients there are at present. From any thread."""
-        return len(self._gatekeeper.connections)
+        return len(self._access.connections)
 
     def _run(self) -> None:
         with self._socket as rep:
             while True:
                 try:
                     frames = rep.recv_multipart(copy=False)
-                    self._gatekeeper.connections.delivered(frames[0].get(zmq.SRCFD))
-                    time.sleep(self._pace.delay_s(time.monotonic()))
+                    self._access.connections.delivered(frames[0].get(zmq.SRCFD))
+                    time.sleep(self._throttle.delay_s(time.monotonic()))
                     here = is_loopback(str(frames[0].get("Peer-Address")))
                     rep.send(self.answer([frame.bytes for frame in frames], here))
                 except zmq.ContextTerminated:

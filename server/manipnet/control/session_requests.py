@@ -10,10 +10,10 @@ from typing import Any, Final
 from manipnet import __version__
 from manipnet.actors.props import Prop
 from manipnet.config.settings import SCALE_RANGE
-from manipnet.control.actors_proxy import Cast, body_key
+from manipnet.control.actors_proxy import ActorsProxy, body_key
 from manipnet.control.request import Handler, Request, RequestError, choice, number
 from manipnet.geometry import Array
-from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
 from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
 from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
@@ -34,13 +34,13 @@ class Requests:
         session: str,
         model: str,
         model_hash: str,
-        cast: Cast,
-        wardrobe: Wardrobe,
+        actors_proxy: ActorsProxy,
+        catalog: ObjectCatalog,
         counters: Counters,
         timings: Timings,
     ) -> None:
         self._session, self._model, self._model_hash = session, model, model_hash
-        self._cast, self._actors, self._wardrobe = cast, cast.actors, wardrobe
+        self._proxy, self._actors, self._catalog = actors_proxy, actors_proxy.actors, catalog
         self._counters, self._timings = counters, timings
         self._started_s = time.monotonic()
 
@@ -70,12 +70,12 @@ class Requests:
             "joint_names": list(JOINT_NAMES),
             "angle_names": list(DOF_NAMES),
             "openxr_joint_names": list(OPENXR_JOINT_NAMES),
-            "objects": list(self._wardrobe.names()),
+            "objects": list(self._catalog.names()),
         }
 
     def _status(self, _: Request) -> dict[str, Any]:
         now_s = time.monotonic()
-        report = self._cast.ask(lambda: status(self._actors, self._counters, self._timings, now_s))
+        report = self._proxy.ask(lambda: status(self._actors, self._counters, self._timings, now_s))
         return {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s, **report}
 
     def _objects(self, _: Request) -> dict[str, Any]:
@@ -86,14 +86,14 @@ class Requests:
             }
 
         return {
-            "objects": list(self._wardrobe.names()),
-            "bodies": self._cast.ask(carried),
-            "problems": self._wardrobe.problems(),
+            "objects": list(self._catalog.names()),
+            "bodies": self._proxy.ask(carried),
+            "problems": self._catalog.problems(),
         }
 
     def _mesh(self, request: Request) -> dict[str, Any]:
-        actor = self._cast.actor(request)
-        props = {prop.name: prop for prop in self._cast.ask(lambda: list(actor.props))}
+        actor = self._proxy.actor(request)
+        props = {prop.name: prop for prop in self._proxy.ask(lambda: list(actor.props))}
         prop = props[choice(request, "body", tuple(props))]
         mesh = prop.shape.mesh
         return {
@@ -105,15 +105,15 @@ class Requests:
         }
 
     def _select_object(self, request: Request) -> dict[str, Any]:
-        actor = self._cast.actor(request)
+        actor = self._proxy.actor(request)
         body = body_key(request)
-        name = choice(request, "object", self._wardrobe.names())
+        name = choice(request, "object", self._catalog.names())
         scale = number(request, "scale", *SCALE_RANGE, default=1.0)
         try:
-            shape = self._wardrobe.shape(name)  # may take a second, on this thread
+            shape = self._catalog.shape(name)  # may take a second, on this thread
         except MeshError as error:
             raise RequestError(str(error)) from None
-        prop, seq = self._cast.ask(lambda: (actor.carry(body, name, shape, scale), actor.seq))
+        prop, seq = self._proxy.ask(lambda: (actor.carry(body, name, shape, scale), actor.seq))
         return {"actor": actor.config.name, "body": prop.name, **_prop(prop), "seq": seq}
 
     def _add_object(self, request: Request) -> dict[str, Any]:
@@ -121,7 +121,7 @@ class Requests:
         if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH:
             raise RequestError("file is missing or no text; give the path of a mesh on the server's machine")
         try:
-            shape = self._wardrobe.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))
+            shape = self._catalog.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))
         except MeshError as error:
             raise RequestError(str(error)) from None
         return {"object": shape.name}
@@ -133,25 +133,25 @@ class Requests:
             for actor in self._actors:
                 actor.timeline.look_ahead_s = seconds
 
-        self._cast.ask(change)
+        self._proxy.ask(change)
         return {"seconds": seconds}
 
     def _rest(self, request: Request) -> dict[str, Any]:
-        actors = self._actors if request.get("actor") is None else [self._cast.actor(request)]
-        self._cast.ask(lambda: [actor.rest() for actor in actors])
+        actors = self._actors if request.get("actor") is None else [self._proxy.actor(request)]
+        self._proxy.ask(lambda: [actor.rest() for actor in actors])
         return {"actors": [actor.config.name for actor in actors]}
 
     def _pause(self, request: Request) -> dict[str, Any]:
         on = request.get("on", True)
         if not isinstance(on, bool):
             raise RequestError(f"on is {on!r:.60}; allowed are true and false")
-        actors = self._actors if request.get("actor") is None else [self._cast.actor(request)]
+        actors = self._actors if request.get("actor") is None else [self._proxy.actor(request)]
 
         def change() -> None:
             for actor in actors:
                 actor.paused = on
 
-        self._cast.ask(change)
+        self._proxy.ask(change)
         return {"actors": [actor.config.name for actor in actors], "paused": on}
 
 

@@ -30,7 +30,7 @@ class _Sender:
     offset_before_s: float
 
 
-class Senders:
+class SenderStats:
     """Notes every frame on its way to `sink`. From any thread."""
 
     def __init__(self, sink: Sink) -> None:

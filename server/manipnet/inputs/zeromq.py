@@ -6,11 +6,11 @@ import time
 import zmq
 
 from manipnet.inputs.base import Intake, Sink
-from manipnet.net.access_control import Gatekeeper
+from manipnet.net.access_control import AccessControl
 from manipnet.net.connection_limits import Connections
 from manipnet.net.curve_keys import KeyFileError, ServerKeys
 from manipnet.net.errors import ListenError
-from manipnet.net.rate_limit import SourceGuard
+from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.zmq_socket import harden, zmq_endpoint
 from manipnet.telemetry import Counters
 from manipnet.wire.bodies import MAX_MESSAGE_BYTES, MessageError, parse_bodies
@@ -32,10 +32,10 @@ class ZmqBodies:
     ) -> None:
         self._intake = Intake("zmq", sink, counters)
         self._counters, self._keys = counters, keys
-        self._guard = SourceGuard()
+        self._guard = SourceRateLimiter()
         self._endpoint, self._ipv6 = zmq_endpoint(host, port)
         self._context: zmq.Context | None = None
-        self._gatekeeper: Gatekeeper | None = None
+        self._access: AccessControl | None = None
         self._thread: threading.Thread | None = None
         self.address = self._endpoint
 
@@ -46,7 +46,7 @@ class ZmqBodies:
         harden(subscriber, self._ipv6)
         subscriber.subscribe(b"")
         try:
-            gatekeeper = Gatekeeper(context, subscriber, self._counters, self._keys)
+            access = AccessControl(context, subscriber, self._counters, self._keys)
             subscriber.bind(self._endpoint)
         except (zmq.ZMQError, KeyFileError) as error:
             subscriber.close()
@@ -58,25 +58,25 @@ class ZmqBodies:
                 "choose a free port (0 takes any) and an address of this machine"
             ) from None
         self.address = subscriber.getsockopt_string(zmq.LAST_ENDPOINT)
-        self._context, self._gatekeeper = context, gatekeeper
+        self._context, self._access = context, access
         # The socket changes hands here, once, and belongs to the thread from now on.
         self._thread = threading.Thread(
-            target=self._run, args=(subscriber, gatekeeper.connections), name="zmq-bodies", daemon=True
+            target=self._run, args=(subscriber, access.connections), name="zmq-bodies", daemon=True
         )
         self._thread.start()
 
     def stop(self) -> None:
         """Stop receiving and free the port; returns when both are done. Harmless when not started."""
-        if self._thread is None or self._context is None or self._gatekeeper is None:
+        if self._thread is None or self._context is None or self._access is None:
             return
         self._context.term()  # wakes the thread with ContextTerminated and waits until it closed its socket
         self._thread.join()
-        self._gatekeeper.join()
-        self._thread = self._context = self._gatekeeper = None
+        self._access.join()
+        self._thread = self._context = self._access = None
 
     def connected(self) -> int:
         """How many senders there are at present. From any thread."""
-        return 0 if self._gatekeeper is None else len(self._gatekeeper.connections)
+        return 0 if self._access is None else len(self._access.connections)
 
     def _run(self, subscriber: zmq.Socket, connections: Connections) -> None:
         with subscriber:

@@ -31,7 +31,7 @@ _EVENTS: Final = (
 _log = logging.getLogger(__name__)
 
 
-class Gatekeeper:
+class AccessControl:
     """Guards one socket of one context, on a thread of its own, until the context is terminated.
 
     With `keys` connections are encrypted, and only clients on the list, which may be edited at any time, come in.
@@ -60,7 +60,7 @@ class Gatekeeper:
             zap.bind(ZAP_ADDRESS)
         socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_MS)
         self._monitor = socket.get_monitor_socket(_EVENTS)
-        self._thread = threading.Thread(target=self._run, name="gatekeeper", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="access", daemon=True)
         self._thread.start()
 
     def join(self) -> None:

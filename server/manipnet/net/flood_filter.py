@@ -1,7 +1,7 @@
 """A flood stopped in the kernel, where a dropped datagram costs nanoseconds and no place in the socket's buffer.
 
 Linux lets a socket carry a small packet filter (classic BPF, no privileges needed): datagrams of known senders pass,
-of all others a random share. Elsewhere, and on IPv6, floods are only cut down by `guard.SourceGuard`.
+of all others a random share. OtherInterfaces, and on IPv6, floods are only cut down by `guard.SourceRateLimiter`.
 """
 
 import ctypes

@@ -7,7 +7,7 @@ KNOWN_PER_S = 4_000
 MAX_SOURCES = 256
 
 
-class SourceGuard:
+class SourceRateLimiter:
     """Admits a source that is known for good messages; strangers share one small budget.
 
     A source is known after its first good message and forgotten when it sends more than `FAULTS_PER_S` bad
@@ -54,7 +54,7 @@ class SourceGuard:
             self._known.pop(source, None)
 
 
-class Pace:
+class Throttle:
     """How long to wait so that no more than `per_s` things are done in a second, after a first `burst`. Pure."""
 
     def __init__(self, per_s: float, burst: int) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import zmq
 
 from manipnet.config.settings import ConfigError, ServerConfig
-from manipnet.net.access_control import Gatekeeper
+from manipnet.net.access_control import AccessControl
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.errors import ListenError
 from manipnet.net.zmq_socket import bind, zmq_endpoint
@@ -63,7 +63,7 @@ class Publisher:
     def connected(self) -> dict[str, int]:
         """How many clients there are at present, by the socket. From any thread."""
         assert self._web is not None
-        return {"hands": len(self._gatekeeper.connections), "web": self._web.client_count}
+        return {"hands": len(self._access.connections), "web": self._web.client_count}
 
     def publish(self, message: HandsMessage) -> None:
         """Send one message to everybody; raises `MessageError` for one that must not leave."""
@@ -107,7 +107,7 @@ class Publisher:
         pub.setsockopt(zmq.MAXMSGSIZE, 1024)  # subscriptions are all that comes in, and CURVE's handshake
         pub.setsockopt(zmq.IPV6, int(ipv6))
         try:
-            self._gatekeeper = Gatekeeper(self._context, pub, self._counters, self._keys)
+            self._access = AccessControl(self._context, pub, self._counters, self._keys)
             bind(pub, endpoint, "--port")
         except BaseException:
             pub.close()

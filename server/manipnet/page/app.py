@@ -17,12 +17,12 @@ from manipnet.geometry import Array
 from manipnet.page.charts import History
 from manipnet.page.frames import Frame, ShapeView
 from manipnet.page.hand_models import HandModel
-from manipnet.page.overlays import ActorLayers
+from manipnet.page.overlays import ActorOverlays
 from manipnet.page.panel import Panel
 from manipnet.page.playback import Recording
 from manipnet.page.prop_models import PropModels, lowest_m
-from manipnet.page.rpc import Link, LinkLog, RefusedError
-from manipnet.page.scenery import Stage
+from manipnet.page.rpc import RefusedError, RpcClient, RpcLog
+from manipnet.page.scenery import Scenery
 from manipnet.page.web_server import OPERATOR, open_server
 from manipnet.wire import Side
 
@@ -39,8 +39,8 @@ def serve(listener: socket.socket, connection: Connection) -> None:
     if hasattr(os, "nice"):
         os.nice(NICE)
     sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (viser greets there; it belongs to the server)
-    link = Link(connection)
-    logging.basicConfig(level=logging.WARNING, handlers=[LinkLog(link)], force=True)
+    link = RpcClient(connection)
+    logging.basicConfig(level=logging.WARNING, handlers=[RpcLog(link)], force=True)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # visitors that go away are no news
     page = Page(link)
     page.open(open_server(listener, "ManipNet Live", page.dropped))
@@ -56,7 +56,7 @@ class ActorView:
         self._scene, self._name = scene, f"/{name}"
         self._hands: dict[Side, HandModel] = {}
         self._props = PropModels(scene, f"/{name}/props")
-        self._layers = ActorLayers(scene, f"/{name}/layers")
+        self._layers = ActorOverlays(scene, f"/{name}/layers")
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], layers: set[str]) -> None:
         """One tick."""
@@ -74,10 +74,10 @@ class ActorView:
 class Page:
     """What is shown to everybody, and a panel for each visitor."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: RpcClient) -> None:
         self.link = link
         self.layers: set[str] = set()
-        """Those of `layers.LAYERS` that are shown."""
+        """Those of `layers.OVERLAYS` that are shown."""
         self.histories: dict[str, History] = {}
         """By actor."""
         self.recording: Recording | None = None
@@ -92,7 +92,7 @@ class Page:
 
     def open(self, server: viser.ViserServer) -> None:
         """Furnish the stage and let visitors in."""
-        self._server, self._stage = server, Stage(server.scene)
+        self._server, self._scenery = server, Scenery(server.scene)
         server.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, brand_color=(88, 166, 255), control_width="medium"
         )
@@ -133,7 +133,7 @@ class Page:
 
     def look(self, camera: viser.CameraHandle) -> None:
         """Let a camera see the hands."""
-        self._stage.look(camera)
+        self._scenery.look(camera)
 
     def recenter(self) -> None:
         """Put table and cameras where the hands are now."""
@@ -184,17 +184,17 @@ class Page:
         spread = np.concatenate(points)
         floor_m = min(lowest_m(frame.props, shapes, places), float(spread[:, 1].min()))
         if not first:
-            self._stage.lower(floor_m)
+            self._scenery.lower(floor_m)
             return
-        self._stage.place(spread, floor_m)
+        self._scenery.place(spread, floor_m)
         for client in self._server.get_clients().values():
-            self._stage.look(client.camera)
+            self._scenery.look(client.camera)
 
     async def _came(self, client: viser.ClientHandle) -> None:
         self._panels[client.client_id] = Panel(self, client, OPERATOR.get())
         self.link.watch(True)
-        if self._stage.placed:
-            self._stage.look(client.camera)
+        if self._scenery.placed:
+            self._scenery.look(client.camera)
 
     async def _left(self, client: viser.ClientHandle) -> None:
         self._panels.pop(client.client_id, None)

@@ -14,7 +14,7 @@ SIZE_M: Final = 0.16
 Moved = Callable[[Array, bool], None]
 
 
-class Handles:
+class Gizmo:
     """They hang on the body, so where they are on it is where the mesh is to sit."""
 
     def __init__(self, scene: viser.SceneApi, moved: Moved) -> None:

@@ -11,7 +11,7 @@ import viser
 from manipnet.config.settings import SCALE_RANGE
 from manipnet.geometry import Array, quat_exp, quat_log
 from manipnet.page.frames import Frame
-from manipnet.page.gizmo import Handles
+from manipnet.page.gizmo import Gizmo
 from manipnet.synthesis.objects.mesh import FORMATS, UNITS_M
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class ObjectsTab:
 
     def __init__(self, page: "Page", client: viser.ClientHandle, doing: Doing) -> None:
         self._page, self._doing, gui = page, doing, client.gui
-        self._handles = Handles(client.scene, self._drag)
+        self._handles = Gizmo(client.scene, self._drag)
         self._carried: dict[str, dict[str, Any]] = {}
         self._shown: dict[str, Any] | None = None
         """What the controls say of the chosen body, as the server told it."""

@@ -16,7 +16,7 @@ from manipnet.synthesis.sensing.proximity import SENSOR_COUNT
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
 from manipnet.wire import Side
 
-LAYERS: Final = {
+OVERLAYS: Final = {
     "ambient": "Ambient sensor",
     "proximity": "Proximity",
     "contacts": "Contacts",
@@ -38,7 +38,7 @@ RAW_COLOR: Final = (255, 255, 255)
 PATH_COLOR: Final = (140, 190, 255)
 
 
-class HandLayers:
+class HandOverlays:
     """The sensors, contacts and targets of one hand, under `name`.
 
     They hang on its wrist: browsers move what hangs together at once, and take in new points when they find the time.
@@ -139,12 +139,12 @@ class Ghost:
         return self._paths[name]
 
 
-class ActorLayers:
+class ActorOverlays:
     """All layers of one actor, under `name`."""
 
     def __init__(self, scene: viser.SceneApi, name: str) -> None:
         self._scene, self._name, self._senser = scene, name, Senser()
-        self._hands: dict[Side, HandLayers] = {}
+        self._hands: dict[Side, HandOverlays] = {}
         self._ghost = Ghost(scene, f"{name}/ghost")
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], shown: set[str]) -> None:
@@ -154,7 +154,7 @@ class ActorLayers:
         for side in ("left", "right"):
             senses = self._senses(frame, side, props, shapes) if shown & set(SENSED) else None
             if senses is not None and side not in self._hands:
-                self._hands[side] = HandLayers(self._scene, f"{self._name}/{side}")
+                self._hands[side] = HandOverlays(self._scene, f"{self._name}/{side}")
             if side in self._hands:
                 self._hands[side].show(senses, shown)
 

@@ -10,7 +10,7 @@ from manipnet.page.calibrate_tab import CalibrateTab
 from manipnet.page.charts import History, Plots
 from manipnet.page.frames import Frame
 from manipnet.page.objects_tab import ObjectsTab
-from manipnet.page.overlays import LAYERS
+from manipnet.page.overlays import OVERLAYS
 from manipnet.page.rpc import RefusedError
 from manipnet.page.takes_tab import TakesTab
 
@@ -97,7 +97,7 @@ class Panel:
         slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
         slider.on_update(lambda event: self._change_look_ahead(event, slider))
         self._look_ahead = slider
-        for name, label in LAYERS.items():
+        for name, label in OVERLAYS.items():
             box = gui.add_checkbox(label, name in self._page.layers)
             box.on_update(lambda event, name=name: self._toggle(name, event.target.value))
         center = gui.add_button("Center the view", icon=viser.Icon.FOCUS_2)

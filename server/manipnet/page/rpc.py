@@ -22,7 +22,7 @@ class RefusedError(RuntimeError):
     """A request the server did not meet; the text says why."""
 
 
-class Link:
+class RpcClient:
     """`incoming` on one thread; `ask` and `watch` on any other."""
 
     def __init__(self, connection: Connection) -> None:
@@ -68,10 +68,10 @@ class Link:
             self._connection.send_bytes(pack(what, content))
 
 
-class LinkLog(logging.Handler):
+class RpcLog(logging.Handler):
     """Carries the log of this process to the server's."""
 
-    def __init__(self, link: Link) -> None:
+    def __init__(self, link: RpcClient) -> None:
         super().__init__(logging.WARNING)
         self._link = link
 

@@ -18,7 +18,7 @@ KEY_M, RIM_M = np.array([0.35, 1.4, 0.55]), np.array([-0.8, 0.6, -0.9])
 FIELD_OF_VIEW_RAD: Final = 0.70
 
 
-class Stage:
+class Scenery:
     """The scenery. It settles under the first things that are shown, and below whatever is lower later."""
 
     def __init__(self, scene: viser.SceneApi) -> None:

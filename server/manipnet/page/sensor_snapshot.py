@@ -12,7 +12,7 @@ import numpy as np
 from manipnet.geometry import Array, mirror_points, mirror_poses
 from manipnet.page.frames import Frame, ShapeView
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.ik.snapshot import present_senses
+from manipnet.synthesis.ik.snapshot import take_snapshot
 from manipnet.synthesis.objects.mesh import ClosedMesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.sensing.ambient import CELL_M, CELLS, CENTER_M
@@ -53,7 +53,7 @@ class Senser:
         mirrored = side == "left"
         if mirrored:
             wrist, obj = mirror_poses(wrist), mirror_poses(obj)
-        local = present_senses(
+        local = take_snapshot(
             self._shape(view),
             wrist,
             obj,

@@ -32,7 +32,7 @@ class JsonFormatter(logging.Formatter):
         return json.dumps(line, ensure_ascii=False, default=str)
 
 
-class Terminal(logging.Handler):
+class Console(logging.Handler):
     """Writes `say` to standard output and log records to standard error; drops lines nobody reads."""
 
     def __init__(self, as_json: bool = False) -> None:

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable
 from typing import Final
 
-from manipnet.runtime.object_catalog import Wardrobe
+from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.synthesis.objects.shape import Shape
 
 POLL_S: Final = 0.5
@@ -15,9 +15,9 @@ _log = logging.getLogger(__name__)
 class MeshWatch:
     """Looks for changed mesh files on a thread of its own, and has their shapes swapped wherever they are used."""
 
-    def __init__(self, wardrobe: Wardrobe, swap: Callable[[Shape, Shape], None]) -> None:
+    def __init__(self, catalog: ObjectCatalog, swap: Callable[[Shape, Shape], None]) -> None:
         """`swap` puts the second shape in the place of the first; if it raises, it is asked again."""
-        self._wardrobe, self._swap = wardrobe, swap
+        self._catalog, self._swap = catalog, swap
         self._pending: list[tuple[Shape, Shape]] = []
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="mesh-watch", daemon=True)
@@ -33,7 +33,7 @@ class MeshWatch:
 
     def look(self) -> None:
         """Look once."""
-        self._pending += self._wardrobe.changed()
+        self._pending += self._catalog.changed()
         while self._pending:
             self._swap(*self._pending[0])
             self._pending.pop(0)

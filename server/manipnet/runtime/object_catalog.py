@@ -26,7 +26,7 @@ class Source:
     scale: float = 1.0
 
 
-class Wardrobe:
+class ObjectCatalog:
     """Shapes of the rig, of the user's `folder` and of the library, each built once, on the thread that asks first.
 
     Of the same name, the rig's comes before the folder's, and that before the library's. Thread-safe.

@@ -25,13 +25,13 @@ def compile_aside() -> None:
     from manipnet.synthesis.objects.shape import build_shape
     from manipnet.synthesis.synthesizer import HandScene, windows_of
     from manipnet.tracking.forecast import damped_velocity
-    from manipnet.tracking.pose_buffer import BodyTrack, sample
+    from manipnet.tracking.pose_buffer import PoseBuffer, sample
 
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     scene = HandScene("right", still, still, still, build_shape(load_library_mesh("cube")))
     build_field(scene.shape.bvh)
     features(scene.shape, windows_of([scene]), np.zeros((1, 22, 3)), np.tile(np.eye(3), (1, 17, 1, 1)))
-    track, angles = BodyTrack(), np.zeros(20)
+    track, angles = PoseBuffer(), np.zeros(20)
     for t_s in (0.0, 0.1):
         track.add(t_s, still[0])
     sample([track], np.linspace(-0.5, 0.5, 21), 0.0, 0.1, damped_velocity)
@@ -39,7 +39,7 @@ def compile_aside() -> None:
     pose_in_world(["right"], angles[None], still[:1], 1.0)
 
 
-class Helper:
+class Precompiler:
     """The second process, if one is needed."""
 
     def __init__(self) -> None:

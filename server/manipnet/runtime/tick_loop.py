@@ -12,7 +12,7 @@ from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.synthesis.synthesizer import HandStep, Side, Synthesizer
 from manipnet.telemetry import Counters, StageClock, Timings
-from manipnet.tracking.outlier_gate import BodyGate
+from manipnet.tracking.outlier_gate import OutlierGate
 from manipnet.tracking.timeline import Tick
 from manipnet.wire import HandsMessage, Latency
 from manipnet.wire.bodies import BodyFrame
@@ -26,7 +26,7 @@ _BEST_FIRST = (_TAKEN, "duplicate", "other_sender", "late", "time_jump", "intern
 """What became of a frame that several actors looked at: the best of what each made of it."""
 
 
-class Onlooker(Protocol):
+class TickObserver(Protocol):
     """Whoever wants to see more of a tick than its message, while `watched`; `see` must return at once."""
 
     @property
@@ -51,14 +51,14 @@ class TickLoop:
         recorder: FlightRecorder,
         counters: Counters,
         timings: Timings,
-        onlooker: Onlooker | None = None,
+        observer: TickObserver | None = None,
     ) -> None:
         self.actors = actors
-        self._onlooker = onlooker
+        self._observer = observer
         self._session, self._publish, self._mailbox = session, publish, mailbox
         self._recorder, self._counters, self._timings = recorder, counters, timings
         self._synthesizer, self._stages = synthesizer, stages
-        self._gate = BodyGate()
+        self._gate = OutlierGate()
         self._published_s: dict[str, float] = {}
 
     def run(self, stopping: Callable[[], bool], every_second: Callable[[float], None]) -> None:
@@ -97,8 +97,8 @@ class TickLoop:
             own = {} if plan is None else dict(zip(plan.scenes, steps, strict=False))
             del steps[: len(own)]
             message = self._publish_hands(actor, tick, self._hands(actor, tick, plan, own))
-            if message is not None and self._onlooker is not None and self._onlooker.watched:
-                self._onlooker.see(actor, tick, plan, own, message)
+            if message is not None and self._observer is not None and self._observer.watched:
+                self._observer.see(actor, tick, plan, own, message)
         return bool(plans)
 
     def _compare(self, frame: BodyFrame) -> str:

@@ -13,7 +13,7 @@ from manipnet.config.settings import default_actor
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
-from manipnet.synthesis.ik.pose import pose_by_least_squares, room_for_poses
+from manipnet.synthesis.ik.pose import allocate_poses, pose_by_least_squares
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.layout import INPUT_SIZE
 from manipnet.synthesis.objects.library import load_library_mesh
@@ -64,7 +64,7 @@ def pose_a_hand(bundle: Bundle) -> None:
     shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
     outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]
-    poses = room_for_poses(1)
+    poses = allocate_poses(1)
     poses.correction[:] = 0.0
     pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
 

@@ -20,12 +20,12 @@ from manipnet.geometry import (
     transform,
 )
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.ik.pose import POSERS, SOLVERS, Poses, SolverName, room_for_poses
+from manipnet.synthesis.ik.pose import POSERS, SOLVERS, Poses, SolverName, allocate_poses
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.features import RAYS_PER_HAND, Windows, sense
 from manipnet.synthesis.model.layout import INPUT_SIZE, PRESENT, WINDOW_OFFSETS_S
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.sensing.proximity import room_for_rays
+from manipnet.synthesis.sensing.proximity import allocate_rays
 
 Side = Literal["left", "right"]
 ABSENT_HAND_M = 0.45
@@ -101,13 +101,13 @@ def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations:
 
 def windows_of(scenes: Sequence[HandScene]) -> Windows:
     """Scenes as the network sees them: left hands mirrored into right ones."""
-    windows = _room_for_windows(len(scenes))
+    windows = _allocate_windows(len(scenes))
     for n, scene in enumerate(scenes):
         _put_scene(windows, n, scene)
     return windows
 
 
-def _room_for_windows(count: int) -> Windows:
+def _allocate_windows(count: int) -> Windows:
     shape = (count, len(WINDOW_OFFSETS_S))
     return Windows(
         np.empty((*shape, 7)), np.empty((*shape, 3)), np.empty((*shape, 7)), np.empty(count, np.bool_), np.empty(count)
@@ -155,7 +155,7 @@ class Synthesizer:
         count, bundle = len(scenes), self._bundle
         if count not in self._batches:
             self._batches[count] = _Batch(count)
-        batch, poses = self._batches[count], room_for_poses(count)
+        batch, poses = self._batches[count], allocate_poses(count)
         order = sorted(range(count), key=lambda index: id(scenes[index].shape))
         for n, index in enumerate(order):
             batch.put(n, scenes[index], states[index])
@@ -187,9 +187,9 @@ class _Batch:
     """What the kernels take of so many hands: made once, filled at every tick."""
 
     def __init__(self, count: int) -> None:
-        self.windows = _room_for_windows(count)
-        self.angles, self.positions, self.rotations = room_for_poses(count)[:3]
-        self.rays = room_for_rays(count * RAYS_PER_HAND + 1)
+        self.windows = _allocate_windows(count)
+        self.angles, self.positions, self.rotations = allocate_poses(count)[:3]
+        self.rays = allocate_rays(count * RAYS_PER_HAND + 1)
         self.rows = np.empty((count, INPUT_SIZE), np.float32)
 
     def put(self, n: int, scene: HandScene, state: HandState) -> None:
@@ -205,5 +205,5 @@ def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
-    for angles, positions, rotations, correction, distances, raw, felt, at, turned in zip(*poses, strict=True):
-        yield HandStep(HandState(felt, at, turned, correction), angles, positions, rotations, distances, raw)
+    for angles, positions, rotations, correction, distances, raw, feedback, at, turned in zip(*poses, strict=True):
+        yield HandStep(HandState(feedback, at, turned, correction), angles, positions, rotations, distances, raw)

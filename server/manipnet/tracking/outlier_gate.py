@@ -48,7 +48,7 @@ class _Memory:
     changed_s: float = field(default=-math.inf)
 
 
-class BodyGate:
+class OutlierGate:
     """Judges the bodies of any number of senders, each in the light of its own past. Not thread-safe."""
 
     def __init__(self) -> None:

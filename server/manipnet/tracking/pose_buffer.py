@@ -21,7 +21,7 @@ times.
 """
 
 
-class BodyTrack:
+class PoseBuffer:
     """Time-ordered poses of one body on its sender's clock; samples may arrive late or in the wrong order."""
 
     def __init__(self) -> None:
@@ -89,7 +89,7 @@ class BodyTrack:
 
 
 def sample(
-    tracks: Sequence[BodyTrack], times_s: Array, present_s: float, until_s: float, forecast: Forecast | None
+    tracks: Sequence[PoseBuffer], times_s: Array, present_s: float, until_s: float, forecast: Forecast | None
 ) -> tuple[Array, list[float]]:
     """Poses of several non-empty tracks at rising `times_s (n,)`: `(len(tracks), n, 7)`, and their ages at `present_s`.
 

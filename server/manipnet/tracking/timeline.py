@@ -18,7 +18,7 @@ import numpy as np
 from manipnet.geometry import Array, compose
 from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S, PRESENT, WINDOW_OFFSETS_S
 from manipnet.tracking.forecast import damped_velocity
-from manipnet.tracking.pose_buffer import TIME_TOLERANCE_S, BodyTrack, Forecast, sample
+from manipnet.tracking.pose_buffer import TIME_TOLERANCE_S, Forecast, PoseBuffer, sample
 
 TICK_HZ: Final = 60
 TICK_S: Final = 1.0 / TICK_HZ
@@ -38,7 +38,7 @@ LATE_S: Final = 10.0
 """A frame up to this far behind was long under way; beyond, it is of another clock."""
 CATCH_UP_S: Final = 0.25
 """A sender that was late, not standing still, has this long to deliver what it kept back."""
-WITNESSES: Final = 3
+CLOCK_JUMP_CONFIRMATIONS: Final = 3
 """Frames in a row that must agree on a new time before it is believed: one bad stamp must not move the
 clock.
 """
@@ -97,7 +97,7 @@ class Run:
 
     def __init__(self, number: int, t0_s: float, now_s: float) -> None:
         self.number, self.t0_s = number, t0_s
-        self.tracks: dict[str, BodyTrack] = {}
+        self.tracks: dict[str, PoseBuffer] = {}
         self.next_index = 0
         self.newest_s, self.heard_s = t0_s, now_s
         self.carried_s: float | None = None
@@ -117,7 +117,7 @@ class Run:
         for key, pose in poses.items():
             track = self.tracks.get(key)
             if track is None:  # making one to throw it away would cost more than all the rest
-                track = self.tracks[key] = BodyTrack()
+                track = self.tracks[key] = PoseBuffer()
             track.seen_s = max(track.seen_s, t_s)
             doubled += pose is not None and not track.add(t_s, pose)
         return doubled
@@ -170,7 +170,7 @@ class Timeline:
         self._ending: Run | None = None
         self._resumed: tuple[int, float] | None = None
         self._senders: dict[str, tuple[str, float]] = {}
-        self._witnesses: list[tuple[float, Poses, float]] = []
+        self._jump_frames: list[tuple[float, Poses, float]] = []
 
     @property
     def running(self) -> bool:
@@ -193,7 +193,7 @@ class Timeline:
         for key in (_CLOCK, *poses):
             if self._may_send(key, source, now_s):
                 self._senders[key] = (source, now_s)
-        self._witnesses.clear()
+        self._jump_frames.clear()
         if silent_for > run.silence_s() and self._is_ahead_of(run, t_s):
             self._resumed = (run.index_at(t_s), now_s)
         doubled = run.add(t_s, poses, now_s)
@@ -327,7 +327,7 @@ class Timeline:
             self._ending = self._ending or self._run
         else:
             self._effective_s = self.look_ahead_s
-        self._witnesses.clear()
+        self._jump_frames.clear()
         self._resumed = None
         self._run = Run(number, t_s, now_s)
         return self._run
@@ -341,14 +341,14 @@ class Timeline:
         """Hold back a frame of an unlikely time until enough others agree with it."""
         if not self._may_send(_CLOCK, source, now_s):
             return "other_sender"
-        if self._witnesses and not 0.0 < t_s - self._witnesses[-1][0] < AHEAD_S:
-            self._witnesses.clear()
-        self._witnesses.append((t_s, poses, now_s))
-        if len(self._witnesses) < WITNESSES:
+        if self._jump_frames and not 0.0 < t_s - self._jump_frames[-1][0] < AHEAD_S:
+            self._jump_frames.clear()
+        self._jump_frames.append((t_s, poses, now_s))
+        if len(self._jump_frames) < CLOCK_JUMP_CONFIRMATIONS:
             return "late" if 0.0 < run.newest_s - t_s < LATE_S else "time_jump"
-        witnesses = list(self._witnesses)
+        jump_frames = list(self._jump_frames)
         self._senders = dict.fromkeys((_CLOCK, *poses), (source, now_s))
-        begun = self._begin(witnesses[0][0], witnesses[0][2])
-        for witness in witnesses:
-            begun.add(*witness)
+        begun = self._begin(jump_frames[0][0], jump_frames[0][2])
+        for jump_frame in jump_frames:
+            begun.add(*jump_frame)
         return None

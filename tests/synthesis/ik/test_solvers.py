@@ -12,7 +12,7 @@ from manipnet.geometry import compose, quat_exp
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, DOF_LIMITS_RAD
 from manipnet.synthesis.ik.ccd import solve_ccd
-from manipnet.synthesis.ik.grasp import grip_into, hold_share
+from manipnet.synthesis.ik.grasp import grasp_confidence, grip_into
 from manipnet.synthesis.ik.least_squares import solve_least_squares
 from manipnet.synthesis.ik.targets import mix_distances, place_targets
 from manipnet.synthesis.objects.mesh import closed_mesh
@@ -123,21 +123,21 @@ STILL = np.tile(np.array([0.2, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), (21, 1))
 @pytest.mark.parametrize(("speed", "turn"), [(0.2, 0.0), (0.0, 1.0), (0.1, -0.7)])
 def test_an_object_that_moves_with_the_wrist_is_held(speed, turn):
     wrist = carried(speed, turn)
-    assert call(hold_share, wrist, compose(wrist, np.tile(BESIDE, (21, 1))), CLOSE) == pytest.approx(1.0)
+    assert call(grasp_confidence, wrist, compose(wrist, np.tile(BESIDE, (21, 1))), CLOSE) == pytest.approx(1.0)
 
 
 def test_an_object_that_rests_or_moves_by_itself_is_not_held():
     wrist = carried(0.3, 0.5)
-    assert call(hold_share, wrist, STILL, CLOSE) == 0.0
-    assert call(hold_share, STILL, wrist, CLOSE) == 0.0
-    assert call(hold_share, STILL, compose(STILL, np.tile(BESIDE, (21, 1))), CLOSE) == 0.0
+    assert call(grasp_confidence, wrist, STILL, CLOSE) == 0.0
+    assert call(grasp_confidence, STILL, wrist, CLOSE) == 0.0
+    assert call(grasp_confidence, STILL, compose(STILL, np.tile(BESIDE, (21, 1))), CLOSE) == 0.0
 
 
 def test_what_moves_in_one_hand_while_the_other_is_far_is_held():
     far = CLOSE + np.array([0.0, 0.3, 0.0])
     moving = carried(0.3, 0.5)
-    assert call(hold_share, STILL, moving, far) == pytest.approx(1.0)
-    assert call(hold_share, STILL, STILL, far) == 0.0
+    assert call(grasp_confidence, STILL, moving, far) == pytest.approx(1.0)
+    assert call(grasp_confidence, STILL, STILL, far) == 0.0
 
 
 def test_a_grip_is_the_thumb_and_the_nearest_fingers():

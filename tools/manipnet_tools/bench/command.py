@@ -13,7 +13,7 @@ from manipnet_tools.bench.machine import this_machine
 from manipnet_tools.bench.models import full_width
 from manipnet_tools.bench.reference import forward_pass
 from manipnet_tools.bench.report import lines, with_ratios
-from manipnet_tools.bench.scenarios import Performance, demo, take
+from manipnet_tools.bench.scenarios import Scenario, demo, take
 from manipnet_tools.bench.sections import SECTIONS, USUAL, Bench, Figures
 from manipnet_tools.takes.take import TakeError
 
@@ -62,7 +62,7 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _performance(path: Path | None, meshes: Sequence[str]) -> Performance:
+def _performance(path: Path | None, meshes: Sequence[str]) -> Scenario:
     if path is None:
         return demo()
     files = {}

@@ -20,7 +20,7 @@ from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer
 from manipnet.telemetry import Counters, Timings
 from manipnet.wire import HandsMessage, encode_binary, encode_msgpack
-from manipnet_tools.bench.scenarios import Performance, actor_config, actor_names, endless
+from manipnet_tools.bench.scenarios import Scenario, actor_config, actor_names, endless
 
 WARM_UP_TICKS = 90
 TURN = 10
@@ -68,7 +68,7 @@ class Observed(Synthesizer):
 class Rig:
     """A tick loop on a performance, one tick at a time."""
 
-    def __init__(self, bundle: Bundle, performance: Performance, actors: int = 1) -> None:
+    def __init__(self, bundle: Bundle, performance: Scenario, actors: int = 1) -> None:
         self.watch = Stopwatch()
         self.synthesizer = Observed(bundle, on_stage=self.watch.ended)
         self._frames = endless(performance, actors)

@@ -23,7 +23,7 @@ from manipnet.inputs.playback import ZmqBodySender, play
 from manipnet.wire import TOPIC_MSGPACK
 from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.bench.machine import resident_mb
-from manipnet_tools.bench.scenarios import Performance, endless
+from manipnet_tools.bench.scenarios import Scenario, endless
 from manipnet_tools.bench.shapes import gourd
 
 START_S = 300.0
@@ -133,7 +133,7 @@ class TimedSender(ZmqBodySender):
         super().send(frame)
 
 
-def end_to_end(model: str, performance: Performance, look_ahead_s: float, seconds: float) -> EndToEnd:
+def end_to_end(model: str, performance: Scenario, look_ahead_s: float, seconds: float) -> EndToEnd:
     """Play a performance to a server in real time and receive its hands on the same machine."""
     with serving(model, performance.meshes, look_ahead_s) as server:
         received, sent = _perform(server, performance, SETTLE_S + seconds + look_ahead_s)
@@ -165,9 +165,7 @@ def _read(payload: bytes, at_s: float) -> Received:
     return Received(message["seq"], message["t_capture"], message["t_publish"], at_s)
 
 
-def _perform(
-    server: Served, performance: Performance, seconds: float
-) -> tuple[list[Received], list[tuple[float, float]]]:
+def _perform(server: Served, performance: Scenario, seconds: float) -> tuple[list[Received], list[tuple[float, float]]]:
     host, _, port = server.addresses["bodies"].removeprefix("tcp://").rpartition(":")
     frames = takewhile(lambda frame: frame.t_s <= seconds, endless(performance))
     received: list[Received] = []

@@ -12,7 +12,7 @@ _SHOWN = ("sense", "infer", "ik")
 
 
 @dataclass(frozen=True)
-class Target:
+class Limit:
     """What is asked: a figure's place in the results, its bound, and whether it must reach it instead."""
 
     what: str
@@ -23,26 +23,26 @@ class Target:
 
 
 TARGETS = (
-    Target("tick, chosen model: p50", ("tick", "total", "p50"), 0.5),
-    Target("tick, chosen model: p99", ("tick", "total", "p99"), 1.0),
-    Target("tick at 5k triangles: p50", ("triangles", "5000", "total", "p50"), 0.5),
-    Target("tick at 5k triangles: p99", ("triangles", "5000", "total", "p99"), 1.0),
-    Target("tick, full width quantised: p50", ("models", "quantised", "total", "p50"), 0.6),
-    Target("tick, full width quantised: p99", ("models", "quantised", "total", "p99"), 1.2),
-    Target("sensors: p50", ("tick", "sense", "p50"), 0.2),
-    Target("inverse kinematics: p50", ("tick", "ik", "p50"), 0.1),
-    Target("200k triangles over 5k", ("ratios", "200k triangles"), 1.3),
-    Target("8 actors over 1", ("ratios", "8 actors"), 3.0),
-    Target("straightforward version over ours", ("straightforward", "times"), 20.0, at_least=True),
-    Target("end to end beyond look-ahead 0.5 s: p99", ("live", "0.5", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
-    Target("end to end beyond look-ahead 0.1 s: p99", ("live", "0.1", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
-    Target("published interval: p99", ("live", "0.5", "interval", "p99_ms"), 18.5, "ms"),
-    Target("hands missing", ("live", "0.5", "missing"), 0.0, ""),
-    Target("ready, warm cache", ("start", "warm_s"), 3.0, "s"),
-    Target("ready, empty cache", ("start", "cold_s"), 12.0, "s"),
-    Target("ten minutes, published interval: p99", ("minutes", "interval", "p99_ms"), 18.5, "ms"),
-    Target("ten minutes, hands missing", ("minutes", "missing"), 0.0, ""),
-    Target("resident memory, one actor", ("live", "0.5", "resident_mb"), 350.0, "MB"),
+    Limit("tick, chosen model: p50", ("tick", "total", "p50"), 0.5),
+    Limit("tick, chosen model: p99", ("tick", "total", "p99"), 1.0),
+    Limit("tick at 5k triangles: p50", ("triangles", "5000", "total", "p50"), 0.5),
+    Limit("tick at 5k triangles: p99", ("triangles", "5000", "total", "p99"), 1.0),
+    Limit("tick, full width quantised: p50", ("models", "quantised", "total", "p50"), 0.6),
+    Limit("tick, full width quantised: p99", ("models", "quantised", "total", "p99"), 1.2),
+    Limit("sensors: p50", ("tick", "sense", "p50"), 0.2),
+    Limit("inverse kinematics: p50", ("tick", "ik", "p50"), 0.1),
+    Limit("200k triangles over 5k", ("ratios", "200k triangles"), 1.3),
+    Limit("8 actors over 1", ("ratios", "8 actors"), 3.0),
+    Limit("straightforward version over ours", ("straightforward", "times"), 20.0, at_least=True),
+    Limit("end to end beyond look-ahead 0.5 s: p99", ("live", "0.5", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
+    Limit("end to end beyond look-ahead 0.1 s: p99", ("live", "0.1", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
+    Limit("published interval: p99", ("live", "0.5", "interval", "p99_ms"), 18.5, "ms"),
+    Limit("hands missing", ("live", "0.5", "missing"), 0.0, ""),
+    Limit("ready, warm cache", ("start", "warm_s"), 3.0, "s"),
+    Limit("ready, empty cache", ("start", "cold_s"), 12.0, "s"),
+    Limit("ten minutes, published interval: p99", ("minutes", "interval", "p99_ms"), 18.5, "ms"),
+    Limit("ten minutes, hands missing", ("minutes", "missing"), 0.0, ""),
+    Limit("resident memory, one actor", ("live", "0.5", "resident_mb"), 350.0, "MB"),
 )
 
 
@@ -59,7 +59,7 @@ def with_ratios(figures: Figures) -> Figures:
     return figures | {"ratios": ratios}
 
 
-def verdicts(figures: Figures) -> list[tuple[Target, float, bool]]:
+def verdicts(figures: Figures) -> list[tuple[Limit, float, bool]]:
     """Every target that was measured, its figure, and whether it is met."""
     found = [(target, _find(figures, target.place)) for target in TARGETS]
     return [

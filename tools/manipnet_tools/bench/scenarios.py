@@ -17,7 +17,7 @@ APART = 0.37
 
 
 @dataclass(frozen=True)
-class Performance:
+class Scenario:
     """Frames at an even rate, and the mesh file and shape of every prop in them."""
 
     name: str
@@ -26,7 +26,7 @@ class Performance:
     meshes: Mapping[str, Path]
     shapes: Mapping[str, Shape]
 
-    def with_shape(self, shape: Shape) -> "Performance":
+    def with_shape(self, shape: Shape) -> "Scenario":
         """The same motion with every prop of another shape."""
         return replace(self, shapes=dict.fromkeys(self.shapes, shape))
 
@@ -37,19 +37,19 @@ class Performance:
         return f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
 
 
-def demo() -> Performance:
+def demo() -> Scenario:
     """What `manipnet-serve --demo` plays."""
     return take(DEMO_FILE, {name: LIBRARY_FOLDER / f"{name}.ply" for name in DEMO_OBJECTS})
 
 
-def take(path: Path, meshes: Mapping[str, Path]) -> Performance:
+def take(path: Path, meshes: Mapping[str, Path]) -> Scenario:
     """A take with a mesh for each of its objects. Raises `TakeError` and `MeshError`."""
     recorded = read_take(path)
     if missing := set(recorded.objects) - meshes.keys():
         raise TakeError(f"{path}: no mesh for {', '.join(sorted(missing))}; give --mesh NAME=FILE for each")
     shapes = {name: load_shape(meshes[name]) for name in recorded.objects}
     frames = list(take_frames(recorded))
-    return Performance(recorded.name, recorded.rate_hz, frames, {name: meshes[name] for name in shapes}, shapes)
+    return Scenario(recorded.name, recorded.rate_hz, frames, {name: meshes[name] for name in shapes}, shapes)
 
 
 def actor_names(actors: int) -> list[str]:
@@ -57,7 +57,7 @@ def actor_names(actors: int) -> list[str]:
     return [f"actor{i}" for i in range(actors)]
 
 
-def actor_config(performance: Performance, name: str, actors: int) -> ActorConfig:
+def actor_config(performance: Scenario, name: str, actors: int) -> ActorConfig:
     """One of `actors` performers, whose bodies are named as `endless` names them."""
     prefix = _prefix(name, actors)
     return ActorConfig(
@@ -67,7 +67,7 @@ def actor_config(performance: Performance, name: str, actors: int) -> ActorConfi
     )
 
 
-def endless(performance: Performance, actors: int = 1) -> Iterator[BodyFrame]:
+def endless(performance: Scenario, actors: int = 1) -> Iterator[BodyFrame]:
     """The frames forth and back for ever, so that nothing jumps, with the bodies of every actor in each."""
     frames = performance.frames
     names = actor_names(actors)

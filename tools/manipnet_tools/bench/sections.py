@@ -19,7 +19,7 @@ from manipnet_tools.bench.harness import STAGES, Race, Rig, memory, race
 from manipnet_tools.bench.live import end_to_end, serving, starts
 from manipnet_tools.bench.models import FullWidth, apart_m, quantised, shipped_full_width
 from manipnet_tools.bench.reference import WIDTH
-from manipnet_tools.bench.scenarios import Performance
+from manipnet_tools.bench.scenarios import Scenario
 from manipnet_tools.bench.shapes import gourd
 
 TRIANGLES = (12, 100, 1000, 5000, 20_000, 80_000, 200_000)
@@ -37,7 +37,7 @@ class Bench:
     """What is measured, and with what."""
 
     bundle: Bundle
-    performance: Performance
+    performance: Scenario
     full: FullWidth
     reference: Callable[[], object]
     seconds: float

@@ -114,7 +114,7 @@ def examine(options: argparse.Namespace) -> list[Finding]:
                 addresses[what] = receiver.address
                 findings.append(Finding("ok", f"listening for {options.seconds:g} s on {receiver.address}"))
         others = set() if options.host in ("0.0.0.0", "::") else elsewhere.own_addresses() - {options.host}
-        beside = elsewhere.Elsewhere(sorted(others), options.osc_port, options.input_port)
+        beside = elsewhere.OtherInterfaces(sorted(others), options.osc_port, options.input_port)
         listen(options.seconds)
         findings += _elsewhere(options.host, beside.heard())
         if motive is not None:

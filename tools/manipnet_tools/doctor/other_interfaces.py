@@ -22,7 +22,7 @@ def own_addresses() -> set[str]:
     return found
 
 
-class Elsewhere:
+class OtherInterfaces:
     """Counts, without reading, what comes to ports of other addresses than the one that is listened on."""
 
     def __init__(self, addresses: Iterable[str], udp_port: int, tcp_port: int) -> None:

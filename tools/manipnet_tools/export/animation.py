@@ -57,7 +57,7 @@ class HandTrack:
 
 
 @dataclass(frozen=True)
-class Performance:
+class Animation:
     """Hands by side and objects by name at `time_s (T,)`, right-handed, Y up, metres."""
 
     name: str
@@ -69,7 +69,7 @@ class Performance:
     """Of those objects whose shape is known."""
 
 
-def read_performance(path: Path, actor: str | None = None) -> Performance:
+def read_performance(path: Path, actor: str | None = None) -> Animation:
     """Fingers from a recording (of one `actor`, the first by default), the file of `manipnet synthesize`, or a take.
 
     Raises `ExportError`, `TakeError`, `RecordingError` and `MeshError`.
@@ -85,7 +85,7 @@ def read_performance(path: Path, actor: str | None = None) -> Performance:
     hands: dict[Side, HandTrack] = {
         side: hand_track(take.fingers[side].positions, take.fingers[side].rotations) for side in SIDES
     }
-    return Performance(take.name, take.rate_hz, take.time_s, hands, {name: take.bodies[name] for name in take.objects})
+    return Animation(take.name, take.rate_hz, take.time_s, hands, {name: take.bodies[name] for name in take.objects})
 
 
 def hand_track(positions: Array, rotations: Array) -> HandTrack:
@@ -108,7 +108,7 @@ def _no_fingers(path: Path, objects: Iterable[str]) -> ExportError:
     )
 
 
-def _read_synthesised(path: Path) -> Performance:
+def _read_synthesised(path: Path) -> Animation:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = dict(file)
@@ -126,10 +126,10 @@ def _read_synthesised(path: Path) -> Performance:
         objects[name] = BodyTrack(arrays["object_poses"][k], seen)
         if f"object_{k}_faces" in arrays:
             meshes[name] = closed_mesh(arrays[f"object_{k}_vertices"], arrays[f"object_{k}_faces"], name)
-    return Performance(path.stem, TICK_HZ, time_s, hands, objects, meshes)
+    return Animation(path.stem, TICK_HZ, time_s, hands, objects, meshes)
 
 
-def _read_recording(path: Path, actor: str | None) -> Performance:
+def _read_recording(path: Path, actor: str | None) -> Animation:
     messages = list(read_hands(path))
     actors = dict.fromkeys(message.actor for message in messages)
     if not messages:
@@ -148,7 +148,7 @@ def _read_recording(path: Path, actor: str | None) -> Performance:
     names = dict.fromkeys(body.name for message in run for body in message.bodies if not body.name.endswith("_wrist"))
     objects = {name: _recorded_body(frames, name) for name in names}
     meshes = {name: mesh for name, mesh in recorded_meshes(path).items() if name in objects}
-    return Performance(path.stem, TICK_HZ, np.arange(len(frames)) / TICK_HZ, hands, objects, meshes)
+    return Animation(path.stem, TICK_HZ, np.arange(len(frames)) / TICK_HZ, hands, objects, meshes)
 
 
 def _longest_run(messages: list[HandsMessage]) -> list[HandsMessage]:
@@ -184,7 +184,7 @@ def _recorded_body(frames: list[HandsMessage | None], name: str) -> BodyTrack:
     return BodyTrack(poses, np.array([body is not None and body.tracked for body in bodies]))
 
 
-def with_meshes(performance: Performance, meshes: Mapping[str, ClosedMesh]) -> Performance:
+def with_meshes(performance: Animation, meshes: Mapping[str, ClosedMesh]) -> Animation:
     """The same with these `meshes` instead of those it knew. Raises `ExportError` for an object it does not have."""
     if unknown := meshes.keys() - performance.objects.keys():
         have = ", ".join(performance.objects) or "none"

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import Array, mirror_points, mirror_quats
 from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_NAMES, PARENTS
-from manipnet_tools.export.animation import ExportError, HandTrack, Performance
+from manipnet_tools.export.animation import Animation, ExportError, HandTrack
 
 DECIMETRES_PER_M = 10.0
 CENTIMETRES_PER_M = 100.0
@@ -16,7 +16,7 @@ _CHANNELS = "Yrotation Xrotation Zrotation"
 _ROOT_CHANNELS = f"CHANNELS 6 Xposition Yposition Zposition {_CHANNELS}"
 
 
-def write_bvh(performance: Performance, folder: Path, right_handed: bool = False) -> list[Path]:
+def write_bvh(performance: Animation, folder: Path, right_handed: bool = False) -> list[Path]:
     """Write `leftHand.bvh`, `rightHand.bvh` and `<object>.bvh` into `folder`; returns the files.
 
     As the dataset's own files they are left-handed decimetres, which every tool here reads; `right_handed` ones are

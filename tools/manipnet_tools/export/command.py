@@ -8,7 +8,7 @@ import tyro
 from rich.console import Console
 
 from manipnet.synthesis.objects.mesh import load_mesh
-from manipnet_tools.export.animation import ExportError, Performance, read_performance, with_meshes
+from manipnet_tools.export.animation import Animation, ExportError, read_performance, with_meshes
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf
@@ -70,7 +70,7 @@ def check(options: ExportOptions) -> None:
         raise ExportError(f"--out {options.out}: its folder does not exist; make it first")
 
 
-def summary(performance: Performance) -> str:
+def summary(performance: Animation) -> str:
     """What a performance holds, in words."""
     seconds = len(performance.time_s) / performance.rate_hz
     hands = " and ".join(performance.hands)

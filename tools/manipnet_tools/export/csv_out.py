@@ -9,12 +9,12 @@ from manipnet.geometry import Array, mirror_quats, quat_conjugate, quat_multiply
 from manipnet.synthesis.hand.kinematics import angles_from_rotations
 from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.synthesis.synthesizer import Side
-from manipnet_tools.export.animation import HandTrack, Performance
+from manipnet_tools.export.animation import Animation, HandTrack
 
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
-def write_csv(performance: Performance, path: Path) -> None:
+def write_csv(performance: Animation, path: Path) -> None:
     """Write the table; right-handed, Y up, metres, radians, seconds. Raises `OSError`."""
     columns: dict[str, Array] = {"time_s": performance.time_s}
     for side, hand in performance.hands.items():

@@ -19,14 +19,14 @@ from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_COUNT, JOINT_NAME
 from manipnet.synthesis.hand.surface import BONES, FACES, VERTICES, WEIGHTS
 from manipnet.synthesis.objects.mesh import ClosedMesh
 from manipnet.wire import Side
-from manipnet_tools.export.animation import HandTrack, Performance
+from manipnet_tools.export.animation import Animation, HandTrack
 from manipnet_tools.export.glb import ATTRIBUTE, INDEX, Buffer
 from manipnet_tools.rendering import CERAMIC, SKIN_LEFT, SKIN_RIGHT, corner_normals
 
 _COLOURS: Mapping[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right": SKIN_RIGHT}
 
 
-def write_gltf(performance: Performance, path: Path) -> None:
+def write_gltf(performance: Animation, path: Path) -> None:
     """Write `.glb` or `.gltf`. Raises `OSError`."""
     scene = _Scene(performance)
     for side, hand in performance.hands.items():
@@ -39,7 +39,7 @@ def write_gltf(performance: Performance, path: Path) -> None:
 class _Scene:
     """A document that grows node by node."""
 
-    def __init__(self, performance: Performance) -> None:
+    def __init__(self, performance: Animation) -> None:
         self._buffer = Buffer()
         self._document: dict[str, list[Any]] = {"nodes": [], "meshes": [], "materials": []}
         self._skins: list[Any] = []

@@ -23,7 +23,7 @@ from manipnet.inputs.natnet.protocol import (
 from manipnet.net.addresses import AllowList, Network
 from manipnet.net.clock_offset import ClockProbes
 from manipnet.net.errors import ListenError
-from manipnet.net.rate_limit import SourceGuard
+from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.udp import Address, UdpThread, bind_udp, join_multicast, local_address_towards
 from manipnet.telemetry import Counters
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, make_sample
@@ -65,7 +65,7 @@ class NatNetBodies:
         allow: Sequence[Network] = (),
     ) -> None:
         self._intake = Intake("natnet", sink, counters)
-        self._guard, self._allowed = SourceGuard(), AllowList(allow)
+        self._guard, self._allowed = SourceRateLimiter(), AllowList(allow)
         self._host, self._port = host, port
         self._multicast, self._interface, self._up = multicast, interface, up
         self._server: Address = (host, port)

@@ -7,7 +7,7 @@ from manipnet.inputs.osc.assembler import GAP_S, FrameAssembler
 from manipnet.inputs.osc.packet import split_packet
 from manipnet.net.addresses import AllowList, Network
 from manipnet.net.flood_filter import FloodFilter, FloodWatch
-from manipnet.net.rate_limit import SourceGuard
+from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.udp import Address, UdpThread, bind_udp
 from manipnet.telemetry import Counters
 from manipnet.wire.bodies import BodyFrame, MessageError
@@ -34,7 +34,7 @@ class OscBodies:
         allow: Sequence[Network] | None = None,
     ) -> None:
         self._intake = Intake("osc", sink, counters)
-        self._guard = SourceGuard(DATAGRAMS_PER_S)
+        self._guard = SourceRateLimiter(DATAGRAMS_PER_S)
         self._allowed = AllowList(allow)
         self._host, self._port = host, port
         self._assemblers: dict[Address, FrameAssembler] = {}

@@ -7,7 +7,7 @@ into arrays of the caller and are what the live tick and the solver call; the fu
 import numpy as np
 
 from manipnet.geometry import Array, quat_to_matrix
-from manipnet.jit import inner, kernel, matrix, on_stack
+from manipnet.jit import inner, kernel, matrix, stack_array
 from manipnet.synthesis.hand.skeleton import (
     BONE_COUNT,
     DOF_AXES,
@@ -19,7 +19,7 @@ from manipnet.synthesis.hand.skeleton import (
     REST_QUATS,
 )
 
-_axes = on_stack(DOF_COUNT, 3)
+_axes = stack_array(DOF_COUNT, 3)
 _REST = quat_to_matrix(REST_QUATS)
 _FIRST_DOF = np.array([int(np.argmax(j == DOF_JOINTS)) if j in DOF_JOINTS else -1 for j in range(BONE_COUNT)])
 _DOFS_OF_BONE = np.array([int(np.sum(j == DOF_JOINTS)) for j in range(BONE_COUNT)])

@@ -13,7 +13,7 @@ from typing import Final, Literal
 import numpy as np
 
 from manipnet.geometry import Array, matrix_to_quat, mirror_quats
-from manipnet.jit import inner, kernel, on_stack, vector
+from manipnet.jit import inner, kernel, stack_array, vector
 from manipnet.synthesis.hand.kinematics import forward_kinematics, forward_kinematics_into
 from manipnet.synthesis.hand.skeleton import (
     BONE_COUNT,
@@ -64,8 +64,8 @@ _MIDDLE_KNUCKLE = FINGER_JOINTS[2][0]
 _JOINTS = np.array([0, 0, *FINGER_JOINTS[0][1:], *(j for chain in FINGER_JOINTS[1:] for j in (0, *chain))])
 _BONES = np.where(_JOINTS < BONE_COUNT, _JOINTS, PARENTS[_JOINTS])
 
-_positions, _rotations, _axes = on_stack(22, 3), on_stack(BONE_COUNT, 3, 3), on_stack(DOF_COUNT, 3)
-_quats, _quat = on_stack(BONE_COUNT, 4), on_stack(4)
+_positions, _rotations, _axes = stack_array(22, 3), stack_array(BONE_COUNT, 3, 3), stack_array(DOF_COUNT, 3)
+_quats, _quat = stack_array(BONE_COUNT, 4), stack_array(4)
 
 
 def pose_in_world(sides: Sequence[Side], angles: Array, T_world_wrist: Array, scale: float) -> tuple[Array, Array]:

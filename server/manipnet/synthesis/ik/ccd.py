@@ -6,13 +6,13 @@ targets: with hinges that angle has a closed form.
 
 import numpy as np
 
-from manipnet.jit import inner, on_stack, vector
+from manipnet.jit import inner, stack_array, vector
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.hand.skeleton import BONE_COUNT, DOF_COUNT, DOF_JOINTS, PARENTS
 from manipnet.synthesis.ik.chains import DOFS, FINGERS, MOVED_JOINTS, clamp, dof_moves
 
 SWEEPS = 8
-_positions, _rotations, _axes = on_stack(22, 3), on_stack(BONE_COUNT, 3, 3), on_stack(DOF_COUNT, 3)
+_positions, _rotations, _axes = stack_array(22, 3), stack_array(BONE_COUNT, 3, 3), stack_array(DOF_COUNT, 3)
 
 
 @inner

@@ -1,15 +1,15 @@
 """Inverse kinematics of one hand at one tick: targets, a solver, and corrections that fade in and out."""
 
-from manipnet.jit import inner, matrix, on_stack, vector
+from manipnet.jit import inner, matrix, stack_array, vector
 from manipnet.synthesis.ik.ccd import solve_ccd
 from manipnet.synthesis.ik.chains import clamp
-from manipnet.synthesis.ik.grasp import hold_share
+from manipnet.synthesis.ik.grasp import grasp_confidence
 from manipnet.synthesis.ik.least_squares import solve_least_squares
 from manipnet.synthesis.ik.targets import place_targets
 from manipnet.synthesis.model.layout import PRESENT
 from manipnet.synthesis.sensing.scene import object_from_wrist
 
-_targets = on_stack(22, 3)
+_targets = stack_array(22, 3)
 FADE_SHARE = 0.6
 """How much of the way to a new correction one tick goes: no popping."""
 
@@ -34,7 +34,7 @@ def correct_by_least_squares(
     rotation, translation, targets = matrix(), vector(), _targets()
     object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
     place_targets(solid, rotation, translation, scale, positions, distances, targets)
-    hold = hold_share(wrist, obj, other)
+    hold = grasp_confidence(wrist, obj, other)
     for dof in range(len(angles)):
         angles[dof] = clamp(predicted[dof] + correction[dof], limits, dof)
     solve_least_squares(predicted, targets, distances, hold, limits, solid.field, rotation, translation, scale, angles)

@@ -4,18 +4,18 @@ Deep inside, the nearest surface may be the far one: a solver that follows the f
 through the object. A thumb is left alone: there is no one direction that opens it.
 """
 
-from manipnet.jit import inner, on_stack
+from manipnet.jit import inner, stack_array
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.ik.chains import CAPSULE_ENDS, CAPSULE_RADII, CAPSULE_STARTS, CAPSULES, DOFS, FINGERS, clamp
 from manipnet.synthesis.objects.distance_field import field_distance
 from manipnet.synthesis.sensing.scene import map_point
 
-STUCK_M = 0.010
+DEEP_M = 0.010
 """A capsule this deep is not pressed into the surface but on its way through the object."""
 OPENINGS = 5
 """Steps from the pose to straight fingers."""
 _SAMPLES = 3
-_closed, _depths, _numbers = on_stack(20), on_stack(FINGERS), on_stack(FINGERS)
+_closed, _depths, _numbers = stack_array(20), stack_array(FINGERS), stack_array(FINGERS)
 
 
 @inner
@@ -36,8 +36,8 @@ def _depth(finger, positions, field, rotation, translation, scale):
 
 
 @inner
-def open_stuck_fingers(angles, limits, field, rotation, translation, scale, positions, rotations, axes):
-    """Straighten the fingers of `angles (20,)` that are `STUCK_M` deep until they are not, or as far as it helps.
+def push_out_deep_fingers(angles, limits, field, rotation, translation, scale, positions, rotations, axes):
+    """Straighten the fingers of `angles (20,)` that are `DEEP_M` deep until they are not, or as far as it helps.
 
     `positions (22, 3)`, `rotations (17, 3, 3)` and `axes (20, 3)` are room to work in.
     """
@@ -47,18 +47,18 @@ def open_stuck_fingers(angles, limits, field, rotation, translation, scale, posi
     for step in range(OPENINGS + 1):
         share = step / OPENINGS
         for finger in range(1, FINGERS):
-            if step > 0 and least[finger] > STUCK_M:
+            if step > 0 and least[finger] > DEEP_M:
                 for k in range(DOFS):
                     dof = DOFS * finger + k
                     angles[dof] = clamp((1.0 - share) * closed[dof], limits, dof)
         forward_kinematics_into(angles, positions, rotations, axes)
         stuck = False
         for finger in range(1, FINGERS):
-            if step == 0 or least[finger] > STUCK_M:
+            if step == 0 or least[finger] > DEEP_M:
                 depth = _depth(finger, positions, field, rotation, translation, scale)
                 if step == 0 or depth < least[finger]:
                     least[finger], best[finger] = depth, share
-            stuck = stuck or least[finger] > STUCK_M
+            stuck = stuck or least[finger] > DEEP_M
         if not stuck:
             break
     for finger in range(1, FINGERS):

@@ -6,7 +6,7 @@ of such frames. Then the thumb and whichever fingers are nearest belong on its s
 
 import numpy as np
 
-from manipnet.jit import inner, matrix, on_stack, vector
+from manipnet.jit import inner, matrix, stack_array, vector
 from manipnet.synthesis.ik.chains import CAPSULE_ENDS, CAPSULE_RADII, CAPSULE_STARTS, CAPSULES, FINGERS
 from manipnet.synthesis.model.layout import PRESENT
 from manipnet.synthesis.sensing.scene import quat_to_matrix_into
@@ -24,11 +24,11 @@ HELPS_M, ALONE_M = 0.15, 0.25
 TAKES_PART_M = 0.010
 """A finger predicted to be this much farther from the object than the nearest one is left out of the grip."""
 _POINTS = 4
-_points = on_stack(_POINTS, 3)
+_points = stack_array(_POINTS, 3)
 
 
 @inner
-def hold_share(wrist, obj, other):
+def grasp_confidence(wrist, obj, other):
     """How sure it is, 0 to 1, that the hand with poses `wrist (21, 7)` holds the object with poses `obj (21, 7)`.
 
     What moves without it is in the `other (21, 3)` wrist's hand, or, where that one is far, in its fingers.

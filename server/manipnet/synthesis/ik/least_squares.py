@@ -6,7 +6,7 @@ cost microseconds. Capsules meet the field, not the triangles: it is smooth and 
 
 import numpy as np
 
-from manipnet.jit import inner, on_stack
+from manipnet.jit import inner, stack_array
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.hand.skeleton import BONE_COUNT, DOF_COUNT, DOF_JOINTS, PARENTS
 from manipnet.synthesis.ik.chains import (
@@ -20,7 +20,7 @@ from manipnet.synthesis.ik.chains import (
     clamp,
     dof_moves,
 )
-from manipnet.synthesis.ik.depenetration import open_stuck_fingers
+from manipnet.synthesis.ik.depenetration import push_out_deep_fingers
 from manipnet.synthesis.ik.grasp import grip_into
 from manipnet.synthesis.objects.distance_field import field_distance
 from manipnet.synthesis.sensing.scene import map_direction_back, map_point
@@ -44,8 +44,13 @@ GRIP_SHARE = 0.4
 GRIP_REACH_M = 0.030
 """How far away the surface may be that they are pulled onto."""
 _MAX_STEP_RAD = 0.2
-_positions, _rotations, _axes = on_stack(22, 3), on_stack(BONE_COUNT, 3, 3), on_stack(DOF_COUNT, 3)
-_square, _columns, _numbers, _grip = on_stack(DOFS, DOFS), on_stack(DOFS, 3), on_stack(DOFS), on_stack(FINGERS)
+_positions, _rotations, _axes = stack_array(22, 3), stack_array(BONE_COUNT, 3, 3), stack_array(DOF_COUNT, 3)
+_square, _columns, _numbers, _grip = (
+    stack_array(DOFS, DOFS),
+    stack_array(DOFS, 3),
+    stack_array(DOFS),
+    stack_array(FINGERS),
+)
 
 
 @inner
@@ -137,7 +142,7 @@ def solve_least_squares(predicted, targets, distances, hold, limits, field, rota
     positions, rotations, axes = _positions(), _rotations(), _axes()
     normal, slope, grip = _square(), _numbers(), _grip()
     grip_into(distances, hold, grip)
-    open_stuck_fingers(angles, limits, field, rotation, translation, scale, positions, rotations, axes)
+    push_out_deep_fingers(angles, limits, field, rotation, translation, scale, positions, rotations, axes)
     for _ in range(ITERATIONS):
         forward_kinematics_into(angles, positions, rotations, axes)
         for finger in range(FINGERS):

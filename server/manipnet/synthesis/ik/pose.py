@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.jit import inner, kernel, on_stack
+from manipnet.jit import inner, kernel, stack_array
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.hand.skeleton import BONE_COUNT, DOF_COUNT, JOINT_COUNT
 from manipnet.synthesis.ik.correction import correct_by_ccd, correct_by_least_squares
@@ -16,7 +16,7 @@ from manipnet.synthesis.model.decode import decode_into
 
 SolverName = Literal["least_squares", "ccd", "none"]
 SOLVERS: tuple[SolverName, ...] = ("least_squares", "ccd", "none")
-FELT_SHARE = 0.5
+FEEDBACK_SHARE = 0.5
 """How much of its corrections the network sees of its own hand: with all of them it strays from the poses it has
 learned, with none it does not know what it holds (docs/results.md, Ideas tried)."""
 
@@ -36,13 +36,13 @@ class Poses(NamedTuple):
     """`(N, 22)` joint to surface as predicted, metres, in [0, 0.035]."""
     raw_positions: Array
     """`(N, 22, 3)` before inverse kinematics."""
-    felt_angles: Array
-    """`(N, 20)` the hand as the network is to see it at the next tick, with `FELT_SHARE` of the correction."""
-    felt_positions: Array
-    felt_rotations: Array
+    feedback_angles: Array
+    """`(N, 20)` the hand as the network is to see it at the next tick, with `FEEDBACK_SHARE` of the correction."""
+    feedback_positions: Array
+    feedback_rotations: Array
 
 
-def room_for_poses(count: int) -> Poses:
+def allocate_poses(count: int) -> Poses:
     """Poses of `count` hands, still to be filled in."""
     return Poses(
         np.empty((count, DOF_COUNT)),
@@ -57,7 +57,7 @@ def room_for_poses(count: int) -> Poses:
     )
 
 
-_axes, _angles = on_stack(DOF_COUNT, 3), on_stack(DOF_COUNT)
+_axes, _angles = stack_array(DOF_COUNT, 3), stack_array(DOF_COUNT)
 
 
 @inner
@@ -70,11 +70,11 @@ def _predict(output, before, response, limits, axes, n, poses, predicted):
 @inner
 def _settle(predicted, axes, n, poses):
     """Joints of hand `n` from its corrected angles, and the hand as the network is to see it."""
-    angles, felt = poses.angles[n], poses.felt_angles[n]
+    angles, feedback = poses.angles[n], poses.feedback_angles[n]
     forward_kinematics_into(angles, poses.positions[n], poses.rotations[n], axes)
     for dof in range(DOF_COUNT):
-        felt[dof] = predicted[dof] + FELT_SHARE * (angles[dof] - predicted[dof])
-    forward_kinematics_into(felt, poses.felt_positions[n], poses.felt_rotations[n], axes)
+        feedback[dof] = predicted[dof] + FEEDBACK_SHARE * (angles[dof] - predicted[dof])
+    forward_kinematics_into(feedback, poses.feedback_positions[n], poses.feedback_rotations[n], axes)
 
 
 @kernel

@@ -14,14 +14,14 @@ from manipnet.synthesis.sensing.proximity import (
     SENSOR_COUNT,
     SENSORS,
     aim_rays,
+    allocate_rays,
     place_sensors,
     read_rays,
-    room_for_rays,
 )
 from manipnet.synthesis.sensing.scene import object_from_wrist
 
 
-class PresentSenses(NamedTuple):
+class SensorSnapshot(NamedTuple):
     """In the wrist frame of a right hand, metres."""
 
     ambient: np.ndarray
@@ -35,7 +35,7 @@ class PresentSenses(NamedTuple):
     """`(22, 3)` of inverse kinematics."""
 
 
-def present_senses(
+def take_snapshot(
     shape: Shape,
     wrist: Array,
     obj: Array,
@@ -45,11 +45,11 @@ def present_senses(
     rotations: Array,
     raw_positions: Array,
     distances: Array,
-) -> PresentSenses:
+) -> SensorSnapshot:
     """Of a hand posed by `positions (22, 3)` and `rotations (17, 3, 3)` at `wrist (7,)` beside a shape at `obj (7,)`;
     the network said `raw_positions (22, 3)` and `distances (22,)`. All as the network sees it: a right hand."""
-    rays, readings = room_for_rays(SENSOR_COUNT + 1), np.empty((1, SENSOR_COUNT), np.float32)
-    senses = PresentSenses(
+    rays, readings = allocate_rays(SENSOR_COUNT + 1), np.empty((1, SENSOR_COUNT), np.float32)
+    senses = SensorSnapshot(
         np.empty(CELLS**3, np.float32),
         np.empty((SENSOR_COUNT, 3)),
         np.empty((SENSOR_COUNT, 3)),

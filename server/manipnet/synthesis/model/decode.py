@@ -3,11 +3,11 @@
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.jit import inner, kernel, on_stack
+from manipnet.jit import inner, kernel, stack_array
 from manipnet.synthesis.hand.kinematics import angles_from_rotations_into, set_identity
 from manipnet.synthesis.model.layout import OUTPUT, OUTPUT_DISTANCE_MAX_M
 
-_distances, _rotations = on_stack(22), on_stack(17, 3, 3)
+_distances, _rotations = stack_array(22), stack_array(17, 3, 3)
 _AXES, _DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
 
 

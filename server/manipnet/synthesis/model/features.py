@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.jit import inner, kernel, matrix, on_stack, vector
+from manipnet.jit import inner, kernel, matrix, stack_array, vector
 from manipnet.synthesis.model.layout import (
     INPUT,
     INPUT_SIZE,
@@ -28,9 +28,9 @@ from manipnet.synthesis.sensing.proximity import (
     SENSORS,
     Rays,
     aim_rays,
+    allocate_rays,
     place_sensors,
     read_rays,
-    room_for_rays,
 )
 from manipnet.synthesis.sensing.scene import object_from_wrist, quat_to_matrix_into
 
@@ -42,7 +42,7 @@ _PROXIMITY = INPUT["proximity"].start
 _DISTANCES, _NORMALS = INPUT["signed_distances"].start, INPUT["surface_normals"].start
 _OUT_AXES, _OUT_DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
 _WINDOW, _SENSED_COUNT = 21, len(SENSED)
-_joint_numbers, _joint_vectors, _sensor_vectors = on_stack(22), on_stack(22, 3), on_stack(SENSOR_COUNT, 3)
+_joint_numbers, _joint_vectors, _sensor_vectors = stack_array(22), stack_array(22, 3), stack_array(SENSOR_COUNT, 3)
 
 
 class Windows(NamedTuple):
@@ -70,7 +70,7 @@ def features(shape: Shape, windows: Windows, positions: Array, rotations: Array)
     """
     count = len(positions)
     rows = np.empty((count, INPUT_SIZE), np.float32)
-    sense(shape, windows, positions, rotations, 0, count, room_for_rays(count * RAYS_PER_HAND + 1), rows)
+    sense(shape, windows, positions, rotations, 0, count, allocate_rays(count * RAYS_PER_HAND + 1), rows)
     return rows
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numba import types
 
 from manipnet.geometry import Array
-from manipnet.jit import inner, on_stack
+from manipnet.jit import inner, stack_array
 
 _BINS = 12
 _LEAF_TRIANGLES = 3
@@ -20,7 +20,7 @@ _BINNED_LEVELS = 48
 _MOST_LEVELS = _BINNED_LEVELS + 24
 _STACK = 96
 """Room for a walk down any tree, one node waiting per level."""
-_nodes, _numbers = on_stack(_STACK, dtype=types.int32), on_stack(_STACK)
+_nodes, _numbers = stack_array(_STACK, dtype=types.int32), stack_array(_STACK)
 
 
 class Bvh(NamedTuple):

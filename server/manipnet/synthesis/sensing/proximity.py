@@ -39,7 +39,7 @@ class Rays(NamedTuple):
     """`(N, 2)` int32: row and column of each ray's reading among the features."""
 
 
-def room_for_rays(count: int) -> Rays:
+def allocate_rays(count: int) -> Rays:
     """Room for `count` rays."""
     return Rays(np.empty((count, 3), np.float32), np.empty((count, 3), np.float32), np.empty((count, 2), np.int32))
 
