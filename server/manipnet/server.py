@@ -36,6 +36,7 @@ from manipnet.runtime.prometheus import MetricsPage
 from manipnet.runtime.status import SilenceWatch, second_line
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.runtime.warm_up import pose_a_hand, warm_up
+from manipnet.synthesis.hand.hand_file import HAND_FILE
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import Synthesizer
@@ -113,7 +114,7 @@ class Server:
         actors_proxy = ActorsProxy(self._actors, self._mailbox)
         recorder = Recorder(config.takes, lambda: self._about(actors_proxy), counters)
         opened.callback(recorder.stop)
-        publisher = Publisher(config, counters, self._keys, recorder.note)
+        publisher = Publisher(config, counters, self._bundle.hand, self._keys, recorder.note)
         opened.callback(publisher.close)
         meshes = MeshWatch(self._catalog, lambda old, new: actors_proxy.ask(lambda: self._reshape(old, new)))
         opened.callback(meshes.stop)
@@ -124,7 +125,7 @@ class Server:
         opened.callback(control.stop)
         control.start()
         page_host = LOOPBACK if self._keys is not None else config.host  # browsers have no keys
-        page = LivePage(page_host, config.page_port, control.answer, counters)
+        page = LivePage(page_host, config.page_port, control.answer, counters, self._bundle.folder / HAND_FILE)
         opened.callback(page.stop)
         page.start()
         bodies = self._zmq_bodies()

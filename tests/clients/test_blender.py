@@ -17,7 +17,10 @@ from test_retarget import ENDS, posed
 
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate, quat_to_matrix
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import encode_binary
+
+HAND = shipped_hand()
 
 EXTENSION = CLIENTS / "blender" / "manipnet_live"
 FAKE = ("bpy", "mathutils", "manipnet_live")
@@ -44,7 +47,7 @@ def pose_of(position, rotation):
 
 def armature(bpy, rng):
     """Both hands with Mixamo's names, hand and finger bones turned at random, in a T-pose of our own."""
-    positions, _ = forward_kinematics(np.zeros(20))
+    positions, _ = forward_kinematics(HAND, np.zeros(20))
     bones = []
     for side, sign in (("Left", -1.0), ("Right", 1.0)):
         joints, turn = positions * [sign, 1, 1] + [sign, 0, 0], quat_exp(rng.normal(size=3))

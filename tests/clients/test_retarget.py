@@ -12,19 +12,21 @@ from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, ma
 from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, PARENTS
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import encode_binary
+
+HAND = shipped_hand()
 
 ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 
 
 def posed(side, rng):
     """A message with one random hand, and where its bones point in the wrist frame `(15, 3)`."""
-    angles = rng.uniform(*DOF_LIMITS_RAD.T)
-    positions, matrices = forward_kinematics(angles)
+    angles = rng.uniform(*HAND.limits.T)
+    positions, matrices = forward_kinematics(HAND, angles)
     world = matrix_to_quat(matrices)
     local = world.copy()
-    local[1:] = quat_multiply(quat_conjugate(world[PARENTS[1:17]]), world[1:])
+    local[1:] = quat_multiply(quat_conjugate(world[HAND.parents[1:17]]), world[1:])
     along = positions[ENDS] - positions[BONES]
     if side == "left":
         local, along = mirror_quats(local), along * [-1, 1, 1]
@@ -38,9 +40,9 @@ def foreign_rig(side, rng, mirrored):
 
     Returns positions, rotations, tips in the rig's hand space, and the turn from our wrist frame to it.
     """
-    positions, _ = forward_kinematics(rng.uniform(-0.2, 0.3, 20))
+    positions, _ = forward_kinematics(HAND, rng.uniform(-0.2, 0.3, 20))
     positions = 1.3 * positions
-    positions[[5, 8, 14]] = 1.3 * forward_kinematics(np.zeros(20))[0][[5, 8, 14]]  # knuckles: they define the hand
+    positions[[5, 8, 14]] = 1.3 * forward_kinematics(HAND, np.zeros(20))[0][[5, 8, 14]]  # the knuckles define the hand
     if (side == "left") != mirrored:
         positions = positions * [-1, 1, 1]
     turn = quat_exp(rng.normal(size=3))

@@ -9,7 +9,7 @@ from make_vectors import messages
 from manipnet.geometry import compose
 from manipnet.outputs import livelink as livelink_json
 from manipnet.outputs.axes import to_unreal
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 LIVE = messages()["live"]
 

@@ -22,9 +22,11 @@ from manipnet.net.curve_keys import (
 from manipnet.net.curve_keys import read_client_keys as read_keys
 from manipnet.net.zap import secure_client
 from manipnet.outputs.publisher import Publisher
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Counters
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
 
+HAND = shipped_hand()
 CONFIG = ServerConfig((default_actor(),), port=0, web_port=0)
 MOST_KEPT_BYTES = 6 << 20
 """For a client that has stopped: `SEND_HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
@@ -43,7 +45,7 @@ def counters():
 
 @pytest.fixture
 def publisher(counters):
-    publisher = Publisher(CONFIG, counters)
+    publisher = Publisher(CONFIG, counters, HAND)
     yield publisher
     publisher.close()
 
@@ -108,7 +110,7 @@ def test_a_list_that_cannot_be_read_is_named_and_leaves_nothing_open(tmp_path):
     keys.allow_file.unlink()
     threads = threading.active_count()
     for start in (
-        lambda: Publisher(CONFIG, Counters(), keys),
+        lambda: Publisher(CONFIG, Counters(), HAND, keys),
         lambda: Control("127.0.0.1", 0, {}, Counters(), keys),
         ZmqBodies(print, Counters(), port=0, keys=keys).start,
     ):
@@ -130,7 +132,7 @@ def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, t
     server, friend = read_server_keys(tmp_path), read_keys(make_client_keys(tmp_path, "stage-pc"))
     frames, hands, bodies, control = [], Counters(), Counters(), Counters()
     with ExitStack() as opened:
-        publisher = Publisher(CONFIG, hands, server)
+        publisher = Publisher(CONFIG, hands, HAND, server)
         opened.callback(publisher.close)
         receiver = ZmqBodies(frames.append, bodies, port=0, keys=server)
         receiver.start()

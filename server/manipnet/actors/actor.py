@@ -10,16 +10,15 @@ from manipnet.actors.output_guard import OutputGuard
 from manipnet.actors.props import Prop, choose_prop
 from manipnet.actors.transitions import HOLD_AFTER_S, PoseTransition, Shown, State, state_at_age
 from manipnet.config.settings import WRISTS, ActorConfig, BodyConfig, BodyKey
-from manipnet.geometry import Array, compose, invert
-from manipnet.synthesis.hand.skeleton import DOF_NAMES
+from manipnet.geometry import SIDES, Array, Side, compose, invert, scale_positions
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Side, state_of
+from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, state_of
 from manipnet.telemetry import Counters
 from manipnet.tracking.timeline import TICK_S, BodyAtTick, BodyHealth, Tick, Timeline
 from manipnet.wire.bodies import BodyFrame, BodySample
 
-SIDES: Final[tuple[Side, Side]] = ("left", "right")
 AT_REST_RAD: Final = 0.03
 """Fingers this near to the rest pose are there."""
 ON_THE_BODY: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -37,14 +36,14 @@ class ShownHand:
 class LiveHand:
     """One hand's memory: what it was synthesised to, what it shows, and which prop it is about."""
 
-    def __init__(self, side: Side, rest_angles: Array, limits: Array, counters: Counters) -> None:
+    def __init__(self, hand: Hand, side: Side, rest_angles: Array, limits: Array, counters: Counters) -> None:
         self.side: Side = side
         self.prop: str | None = None
         self.resting = False
         """Asked to rest: no synthesis until the hand has eased there."""
-        self._rest_angles = rest_angles
+        self._hand, self._rest_angles = hand, rest_angles
         self._presence = PoseTransition(rest_angles, OutputGuard(limits, counters))
-        self.memory = state_of(rest_angles)
+        self.memory = state_of(hand, rest_angles)
 
     @property
     def shown(self) -> Shown | None:
@@ -64,12 +63,12 @@ class LiveHand:
         if step is not None:
             self.memory = step.state
         elif state == "rest":
-            self.memory = state_of(self._rest_angles)
+            self.memory = state_of(self._hand, self._rest_angles)
         return None if shown is None else ShownHand(shown, self.prop)
 
     def recover(self) -> None:
         """Go on from what is shown: the memory cannot be trusted."""
-        self.memory = state_of(self._rest_angles if self.shown is None else self.shown.angles)
+        self.memory = state_of(self._hand, self._rest_angles if self.shown is None else self.shown.angles)
 
     def at_rest(self) -> bool:
         """Whether the fingers have reached the rest pose."""
@@ -98,10 +97,13 @@ class Actor:
         self.seq = 0
         self.paused = False
         """Asked to pause: both hands stay as they are shown, wherever the wrists go."""
-        limits = _limits(config, bundle.limits)
+        self.hand = bundle.hand
+        limits = _limits(config, bundle)
         rest_angles = np.clip(bundle.rest_angles, *limits.T)
         self.hands: dict[Side, LiveHand] = {
-            side: LiveHand(side, rest_angles, limits, counters) for side in SIDES if f"{side}_wrist" in config.wrists
+            side: LiveHand(bundle.hand, side, rest_angles, limits, counters)
+            for side in SIDES
+            if f"{side}_wrist" in config.wrists
         }
         self._parts, self._offsets = _parts(config), _offsets(config)
         self._last: tuple[int, int] | None = None
@@ -251,7 +253,7 @@ class Actor:
 
 
 def _shrunk(window: Array, size: float) -> Array:
-    return window if size == 1.0 else window * np.append(np.full(3, 1.0 / size), np.ones(4))
+    return window if size == 1.0 else scale_positions(window, 1.0 / size)
 
 
 def _parts(config: ActorConfig) -> dict[BodyKey, str]:
@@ -266,11 +268,12 @@ def _offsets(config: ActorConfig) -> dict[str, Array]:
     return {part: body.offset for part, body in bodies.items() if body.offset is not None}
 
 
-def _limits(config: ActorConfig, limits: Array) -> Array:
-    """The model's limits `(20, 2)`, narrowed as the actor's rig says."""
-    limits = limits.copy()
+def _limits(config: ActorConfig, bundle: Bundle) -> Array:
+    """The model's limits `(A, 2)`, narrowed by the actor's rig."""
+    limits = bundle.limits.copy()
     for name, ends in config.limits.items():
-        limits[DOF_NAMES.index(name)] = np.clip(ends, *limits[DOF_NAMES.index(name)])
+        angle = bundle.hand.angle_names.index(name)
+        limits[angle] = np.clip(ends, *limits[angle])
     return limits
 
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from manipnet.actors.actor import Actor, ShownHand
 from manipnet.actors.transitions import HOLD_AFTER_S
+from manipnet.geometry import Side
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.openxr import pose_in_world
-from manipnet.synthesis.synthesizer import Side
 from manipnet.tracking.timeline import Tick
 from manipnet.wire import BodyPose, HandPose, HandsMessage, Latency
 
@@ -28,7 +29,7 @@ def hands_message(
         t_capture=tick.time_s,
         t_publish=t_publish,
         look_ahead=tick.look_ahead_s,
-        hands=hand_poses(hands, actor.config.hand_scale),
+        hands=hand_poses(actor.hand, hands, actor.config.hand_scale),
         bodies=tuple(
             BodyPose(body.age_s <= HOLD_AFTER_S, body.pose, name) for name, body in sorted(tick.bodies.items())
         ),
@@ -38,22 +39,22 @@ def hands_message(
     return message
 
 
-def hand_poses(hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, HandPose]:
+def hand_poses(hand: Hand, hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, HandPose]:
     """What is shown of each hand, with its joints in the world; `scale` is the hand's size over the model's."""
     if not hands:
         return {}
-    shown = [hand.shown for hand in hands.values()]
-    angles, wrists = np.array([hand.angles for hand in shown]), np.array([hand.wrist for hand in shown])
-    local, joints = pose_in_world(list(hands), angles, wrists, scale)
+    shown = [one.shown for one in hands.values()]
+    angles, wrists = np.array([one.angles for one in shown]), np.array([one.wrist for one in shown])
+    local, joints = pose_in_world(hand, list(hands), angles, wrists, scale)
     return {
         side: HandPose(
-            state=hand.shown.state,
-            object=hand.prop,
+            state=one.shown.state,
+            object=one.prop,
             scale=scale,
-            angles=hand.shown.angles,
+            angles=one.shown.angles,
             rotations=local[i],
-            wrist=hand.shown.wrist,
+            wrist=one.shown.wrist,
             joints=joints[i],
         )
-        for i, (side, hand) in enumerate(hands.items())
+        for i, (side, one) in enumerate(hands.items())
     }

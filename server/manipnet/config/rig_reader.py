@@ -12,11 +12,11 @@ import numpy as np
 from manipnet.config.settings import SCALE_RANGE, WRISTS, ActorConfig, BodyConfig, ConfigError, ObjectConfig
 from manipnet.config.toml_source import read_tree
 from manipnet.geometry import Array, quat_normalize
-from manipnet.synthesis.hand.skeleton import DOF_NAMES
 from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.model.providers import PROVIDERS
 from manipnet.synthesis.objects.library import library_file, library_names
 from manipnet.synthesis.objects.mesh import UNITS_M
+from manipnet.wire.hand_names import ANGLE_NAMES
 
 MAX_FILE_BYTES = 1_000_000
 
@@ -144,7 +144,7 @@ class _Reader:
 
     def _limits(self, value: Any, at: tuple) -> dict[str, tuple[float, float]]:
         at = (*at, "limits_deg")
-        self._known(self._table(value, at), at, DOF_NAMES)
+        self._known(self._table(value, at), at, ANGLE_NAMES)
         limits: dict[str, tuple[float, float]] = {}
         for name, ends in value.items():
             low, high = self._numbers(ends, 2, (*at, name))

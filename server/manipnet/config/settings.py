@@ -55,7 +55,7 @@ class ActorConfig:
     objects: tuple[ObjectConfig, ...] = ()
     hand_scale: float = 1.0
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Lower and upper limit in radians of some angles of `skeleton.DOF_NAMES`, inside the model's own."""
+    """Lower and upper limit in radians of some angles of `wire.hand_names.ANGLE_NAMES`, inside the model's own."""
 
 
 @dataclass(frozen=True, slots=True)

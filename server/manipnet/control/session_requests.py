@@ -15,13 +15,12 @@ from manipnet.control.request import Handler, Request, RequestError, choice, num
 from manipnet.geometry import Array
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
-from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import UNITS_M, MeshError
 from manipnet.telemetry import Counters, Timings
 from manipnet.tracking.timeline import TICK_HZ
 from manipnet.wire import VERSION
+from manipnet.wire.hand_names import ANGLE_NAMES, JOINT_NAMES, OPENXR_JOINT_NAMES
 
 MAX_PATH: Final = 1024
 
@@ -68,7 +67,7 @@ class Requests:
             "tick_hz": TICK_HZ,
             "actors": [actor.config.name for actor in self._actors],
             "joint_names": list(JOINT_NAMES),
-            "angle_names": list(DOF_NAMES),
+            "angle_names": list(ANGLE_NAMES),
             "openxr_joint_names": list(OPENXR_JOINT_NAMES),
             "objects": list(self._catalog.names()),
         }

@@ -11,8 +11,8 @@ import numpy as np
 
 from manipnet.geometry import Array, compose, invert
 from manipnet.outputs.axes import to_unreal
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 from manipnet.wire import HandsMessage, Side
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 DEFAULT_PORT = 54321
 ORDER = (1, 0, *range(2, 26))

@@ -14,6 +14,7 @@ from manipnet.net.zmq_socket import bind, zmq_endpoint
 from manipnet.outputs.livelink import LiveLinkJsonSender
 from manipnet.outputs.vmc import VmcSender
 from manipnet.outputs.websocket import WebSocketPublisher
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.telemetry import Counters
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, encode_binary, encode_msgpack
 
@@ -30,10 +31,13 @@ class Publisher:
         self,
         config: ServerConfig,
         counters: Counters,
+        hand: Hand,
         keys: ServerKeys | None = None,
         record: Callable[[bytes], object] = lambda _: None,
     ) -> None:
         """Binds all sockets; raises `ListenError` or `ConfigError`, and then holds none.
+
+        `hand` is the one that the messages describe.
 
         `record` is given each message as msgpack, and must return at once.
 
@@ -48,7 +52,7 @@ class Publisher:
             self._pub = self._bind_pub(config.host, config.port)
             self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.web_port, counters)
             if config.vmc is not None:
-                self._senders.append(("vmc", VmcSender(*_resolve("--vmc", config.vmc))))
+                self._senders.append(("vmc", VmcSender(*_resolve("--vmc", config.vmc), hand)))
             if config.livelink is not None:
                 self._senders.append(("livelink", LiveLinkJsonSender(*_resolve("--livelink", config.livelink))))
         except BaseException:

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -24,6 +25,8 @@ from manipnet.page.prop_models import PropModels, lowest_m
 from manipnet.page.rpc import RefusedError, RpcClient, RpcLog
 from manipnet.page.scenery import Scenery
 from manipnet.page.web_server import OPERATOR, open_server
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.hand_file import read_hand
 from manipnet.wire import Side
 
 REFRESH_S: Final = 0.5
@@ -33,8 +36,8 @@ FLOOR_EVERY: Final = 15
 """Frames between two looks at what is lowest."""
 
 
-def serve(listener: socket.socket, connection: Connection) -> None:
-    """Serve the page until the server ends, whatever way it ends."""
+def serve(listener: socket.socket, connection: Connection, hand_file: Path) -> None:
+    """Serve the page until the server ends, whatever way it ends. `hand_file` describes the hand that is shown."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is for the server, which then ends this
     if hasattr(os, "nice"):
         os.nice(NICE)
@@ -42,7 +45,7 @@ def serve(listener: socket.socket, connection: Connection) -> None:
     link = RpcClient(connection)
     logging.basicConfig(level=logging.WARNING, handlers=[RpcLog(link)], force=True)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # visitors that go away are no news
-    page = Page(link)
+    page = Page(link, read_hand(hand_file))
     page.open(open_server(listener, "ManipNet Live", page.dropped))
     threading.Thread(target=page.refresh, name="refresh", daemon=True).start()
     page.run()
@@ -52,18 +55,18 @@ def serve(listener: socket.socket, connection: Connection) -> None:
 class ActorView:
     """One actor in the scene."""
 
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        self._scene, self._name = scene, f"/{name}"
+    def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
+        self._scene, self._name, self._hand = scene, f"/{name}", hand
         self._hands: dict[Side, HandModel] = {}
         self._props = PropModels(scene, f"/{name}/props")
-        self._layers = ActorOverlays(scene, f"/{name}/layers")
+        self._layers = ActorOverlays(scene, f"/{name}/layers", hand)
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], layers: set[str]) -> None:
         """One tick."""
         hands = frame.message.hands
         for side, hand in hands.items():
             if side not in self._hands or self._hands[side].scale != hand.scale:
-                self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", side, hand.scale)
+                self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", self._hand, side, hand.scale)
             self._hands[side].pose(hand)
         for side, model in self._hands.items():
             model.show(side in hands)
@@ -74,8 +77,8 @@ class ActorView:
 class Page:
     """What is shown to everybody, and a panel for each visitor."""
 
-    def __init__(self, link: RpcClient) -> None:
-        self.link = link
+    def __init__(self, link: RpcClient, hand: Hand) -> None:
+        self.link, self._hand = link, hand
         self.layers: set[str] = set()
         """Those of `layers.OVERLAYS` that are shown."""
         self.histories: dict[str, History] = {}
@@ -118,7 +121,7 @@ class Page:
         with self._drawing, self._server.atomic():
             self._settle(frame, shapes)
             if name not in self._views:
-                self._views[name] = ActorView(self._server.scene, name)
+                self._views[name] = ActorView(self._server.scene, name, self._hand)
             self._views[name].show(frame, shapes, self.layers)
             for panel in list(self._panels.values()):
                 panel.follow(None if self.recording is not None else frame)

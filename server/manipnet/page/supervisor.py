@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, Final
 
 from manipnet.actors.actor import Actor, Plan
@@ -44,11 +45,12 @@ Answer = Callable[[list[bytes]], bytes]
 class LivePage:
     """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, answer: Answer, counters: Counters) -> None:
-        """Raises `ListenError`. `answer` meets the page's requests, as it does any client's."""
+    def __init__(self, host: str, port: int, answer: Answer, counters: Counters, hand_file: Path) -> None:
+        """Raises `ListenError`. `answer` meets the page's requests, as it does any client's; `hand_file` describes the
+        hand that is shown."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._answer, self._counters = answer, counters
+        self._answer, self._counters, self._hand_file = answer, counters, hand_file
         self.watched = False
         """Whether a browser is open: only then is there anything to `see`."""
         self._news, self._telling = threading.Condition(), threading.Lock()
@@ -108,7 +110,9 @@ class LivePage:
         """One life of the page's process."""
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=_page, args=(self._listener, theirs), name="page", daemon=True)
+        process = context.Process(
+            target=_page, args=(self._listener, theirs, self._hand_file), name="page", daemon=True
+        )
         process.start()
         theirs.close()
         sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
@@ -185,10 +189,10 @@ def _prop(prop: Prop, offset: Array) -> PropView:
     return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
 
 
-def _page(listener: socket.socket, connection: Connection) -> None:
+def _page(listener: socket.socket, connection: Connection, hand_file: Path) -> None:
     from manipnet.page.app import serve  # what it needs is of no use to the server itself
 
-    serve(listener, connection)
+    serve(listener, connection, hand_file)
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -13,9 +13,9 @@ from manipnet.config.settings import default_actor
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
-from manipnet.synthesis.ik.pose import allocate_poses, pose_by_least_squares
+from manipnet.synthesis.ik.pose import allocate_poses, pose_kernel
+from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.model.layout import INPUT_SIZE
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import HandScene, Synthesizer, windows_of
@@ -63,10 +63,23 @@ def pose_a_hand(bundle: Bundle) -> None:
     """Decode and solve: the kernel that this process compiles at a first start, while another compiles the rest."""
     shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
-    outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]
-    poses = allocate_poses(1)
+    outputs, before = bundle.infer(np.zeros((1, bundle.layout.input_size), np.float32)), bundle.rest_angles[None]
+    poses = allocate_poses(bundle.hand, 1)
     poses.correction[:] = 0.0
-    pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
+    pose_kernel(DEFAULT_SOLVER)(
+        bundle.hand.skeleton,
+        bundle.hand.chains,
+        bundle.layout.output_columns,
+        shape.solid,
+        windows,
+        outputs,
+        before,
+        bundle.response,
+        bundle.limits,
+        0,
+        1,
+        poses,
+    )
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

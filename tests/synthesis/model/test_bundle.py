@@ -9,14 +9,18 @@ import onnxruntime
 import pytest
 
 from manipnet.synthesis.model.bundle import BundleError, load_bundle
-from manipnet.synthesis.model.layout import INPUT_SIZE
+from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
+
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
 
 HAS_CUDA = "CUDAExecutionProvider" in onnxruntime.get_available_providers()
 
 
 @pytest.mark.skipif(HAS_CUDA, reason="this machine's ONNX Runtime has CUDA")
 def test_without_cuda_the_processor_does_it_and_a_line_says_why(tiny_bundle: Path, caplog) -> None:
-    rows = np.random.default_rng(0).normal(size=(3, INPUT_SIZE)).astype(np.float32)
+    rows = np.random.default_rng(0).normal(size=(3, LAYOUT.input_size)).astype(np.float32)
     wanted = load_bundle(tiny_bundle, "cpu").infer(rows)
     with caplog.at_level(logging.WARNING):
         bundle = load_bundle(tiny_bundle, "cuda")

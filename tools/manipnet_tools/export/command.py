@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 from rich.console import Console
 
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet_tools.export.animation import Animation, ExportError, read_performance, with_meshes
 from manipnet_tools.export.bvh_out import write_bvh
@@ -44,7 +45,7 @@ def run(options: ExportOptions) -> None:
     check(options)
     console = Console(stderr=True)
     with console.status(f"reading {options.source}"):
-        performance = read_performance(options.source, options.actor)
+        performance = read_performance(options.source, shipped_hand(), options.actor)
         files = named_files(options.mesh, performance.objects)
         performance = with_meshes(performance, {name: load_mesh(file, name=name) for name, file in files.items()})
     with console.status(f"writing {options.out}"):
