@@ -67,9 +67,8 @@ def pose_a_hand(bundle: Bundle) -> None:
     poses = allocate_poses(bundle.hand, 1)
     poses.correction[:] = 0.0
     pose_kernel(DEFAULT_SOLVER)(
-        bundle.hand.skeleton,
-        bundle.hand.chains,
-        bundle.layout.output_columns,
+        bundle.hand.packed,
+        bundle.layout.output_starts,
         shape.solid,
         windows,
         outputs,

@@ -186,9 +186,8 @@ class Synthesizer:
         self._on_stage("infer")
         for shape, first, last in groups:
             self._pose(
-                hand.skeleton,
-                hand.chains,
-                layout.output_columns,
+                hand.packed,
+                layout.output_starts,
                 shape.solid,
                 batch.windows,
                 outputs,

@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 import pytest
+from other_hands import three_fingered
+from tiny_bundle import write_tiny_bundle
 
+from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.model.bundle import BundleError, load_bundle
 from manipnet.synthesis.model.layout import layout_of
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -48,4 +51,21 @@ def test_endlessly_nested_json_is_refused(tiny_bundle: Path, tmp_path: Path) -> 
     shutil.copytree(tiny_bundle, folder)
     (folder / "bundle.json").write_text('{"format": ' * 100_000)
     with pytest.raises(BundleError, match="not JSON"):
+        load_bundle(folder)
+
+
+def test_a_hand_that_messages_cannot_carry_is_refused_by_name(tmp_path: Path) -> None:
+    folder = write_tiny_bundle(tmp_path / "three", hand=three_fingered(HAND))
+    with pytest.raises(BundleError, match="the hand 'three fingers' does not fit the hands messages: it has 14 joints"):
+        load_bundle(folder)
+
+
+def test_another_hand_beside_a_model_is_refused(tiny_bundle: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "mixed"
+    shutil.copytree(tiny_bundle, folder)
+    write_hand(three_fingered(HAND), folder / HAND_FILE)
+    with pytest.raises(BundleError, match=r"hand\.npz: the hand 'three fingers' does not fit"):
+        load_bundle(folder)
+    (folder / HAND_FILE).unlink()
+    with pytest.raises(BundleError, match=r"hand\.npz: cannot be read"):
         load_bundle(folder)

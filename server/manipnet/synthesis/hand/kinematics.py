@@ -10,6 +10,7 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, matrix, stack_array
 from manipnet.synthesis.hand.hand import MAX_ANGLES, Hand, Skeleton
+from manipnet.synthesis.hand.packed import unpack_skeleton
 from manipnet.synthesis.rotations import (
     axis_rotation_into,
     copy_matrix_into,
@@ -108,14 +109,15 @@ def angles_from_rotations_into(skeleton: Skeleton, rotations: Array, angles: Arr
 
 
 @kernel
-def _forward_batch(skeleton: Skeleton, angles: Array, positions: Array, rotations: Array):
-    axes = _axes()
+def _forward_batch(hand: np.ndarray, angles: Array, positions: Array, rotations: Array):
+    skeleton, axes = unpack_skeleton(hand), _axes()
     for i in range(len(angles)):
         forward_kinematics_into(skeleton, angles[i], positions[i], rotations[i], axes)
 
 
 @kernel
-def _angles_batch(skeleton: Skeleton, rotations: Array, angles: Array):
+def _angles_batch(hand: np.ndarray, rotations: Array, angles: Array):
+    skeleton = unpack_skeleton(hand)
     for i in range(len(rotations)):
         angles_from_rotations_into(skeleton, rotations[i], angles[i])
 
@@ -125,7 +127,7 @@ def forward_kinematics(hand: Hand, angles: Array) -> tuple[Array, Array]:
     flat = np.ascontiguousarray(angles, dtype=np.float64).reshape(-1, hand.angle_count)
     positions = np.empty((len(flat), hand.joint_count, 3))
     rotations = np.empty((len(flat), hand.bone_count, 3, 3))
-    _forward_batch(hand.skeleton, flat, positions, rotations)
+    _forward_batch(hand.packed, flat, positions, rotations)
     lead = np.shape(angles)[:-1]
     return positions.reshape(*lead, *positions.shape[1:]), rotations.reshape(*lead, *rotations.shape[1:])
 
@@ -134,5 +136,5 @@ def angles_from_rotations(hand: Hand, rotations: Array) -> Array:
     """Bone rotations `(..., B, 3, 3)` in the wrist frame to the nearest angles `(..., A)`; limits are not applied."""
     flat = np.ascontiguousarray(rotations, dtype=np.float64).reshape(-1, hand.bone_count, 3, 3)
     angles = np.empty((len(flat), hand.angle_count))
-    _angles_batch(hand.skeleton, flat, angles)
+    _angles_batch(hand.packed, flat, angles)
     return angles.reshape(*np.shape(rotations)[:-3], hand.angle_count)

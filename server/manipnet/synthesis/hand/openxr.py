@@ -14,8 +14,9 @@ import numpy as np
 
 from manipnet.geometry import Array, Side, matrix_to_quat, mirror_quats
 from manipnet.jit import kernel, stack_array, vector
-from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Hand, Indices, Skeleton
+from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Hand, Indices
 from manipnet.synthesis.hand.kinematics import forward_kinematics, forward_kinematics_into
+from manipnet.synthesis.hand.packed import unpack_skeleton
 from manipnet.synthesis.rotations import matrix_to_quat_into, multiply_quats_into, quat_rotate_into
 
 METACARPAL_BASE: Final = 0.3
@@ -30,12 +31,11 @@ class OpenXrFrames(NamedTuple):
     """How the 26 OpenXR joints follow a hand's own."""
 
     joints: Indices
-    """`(26,)` the joint that each is at; 0, the wrist, for those between our joints."""
+    """`(26,)` the joint on the way to which each lies from the wrist."""
+    shares: Array
+    """`(26,)` how far along that way: 1 at the joint itself."""
     bones: Indices
     """`(26,)` the bone that each turns with."""
-    knuckles: Indices
-    """`(26,)` the knuckle at the end of each finger metacarpal, 0 for all other joints."""
-    middle_knuckle: int
     offsets: Array
     """`(2, 26, 4)` the frame of each in its bone's, on a right and on a left hand."""
 
@@ -53,13 +53,13 @@ def pose_in_world(
     left = np.array([side == "left" for side in sides])
     frames = openxr_frames(hand)
     local, joints = np.empty((len(left), hand.bone_count, 4)), np.empty((len(left), len(frames.joints), 7))
-    _pose_in_world(hand.skeleton, frames, angles, T_world_wrist, left, scale, local, joints)
+    _pose_in_world(hand.packed, frames, angles, T_world_wrist, left, scale, local, joints)
     return local, joints
 
 
 @kernel
 def _pose_in_world(
-    skeleton: Skeleton,
+    hand: np.ndarray,
     frames: OpenXrFrames,
     angles: Array,
     wrists: Array,
@@ -68,7 +68,7 @@ def _pose_in_world(
     local: Array,
     joints: Array,
 ):
-    positions, rotations, axes = _positions(), _rotations(), _axes()
+    skeleton, positions, rotations, axes = unpack_skeleton(hand), _positions(), _rotations(), _axes()
     quats, turned, point = _quats(), _quat(), vector()
     for n in range(len(angles)):
         forward_kinematics_into(skeleton, angles[n], positions, rotations, axes)
@@ -78,11 +78,7 @@ def _pose_in_world(
         wrist, own = wrists[n], joints[n]
         for i in range(len(frames.joints)):
             for k in range(3):
-                p = positions[frames.joints[i], k]
-                if frames.knuckles[i] > 0:
-                    p = METACARPAL_BASE * positions[frames.knuckles[i], k]
-                if i == 0:
-                    p = 0.5 * (1.0 + METACARPAL_BASE) * positions[frames.middle_knuckle, k]
+                p = frames.shares[i] * positions[frames.joints[i], k]
                 point[k] = scale * (-p if left[n] and k == 0 else p)
             quat_rotate_into(wrist[3:], point, own[i, :3])
             for k in range(3):
@@ -95,12 +91,16 @@ def _pose_in_world(
 def openxr_frames(hand: Hand) -> OpenXrFrames:
     """The frames of the OpenXR joints on a hand whose joints messages can carry (`wire.hand_names`)."""
     thumb, *fingers = hand.fingers
+    middle_knuckle = fingers[1][0]
     # the thumb's metacarpal is its second bone, which both carpal angles have turned
-    joints = np.array([0, 0, *thumb[1:], *(joint for chain in fingers for joint in (0, *chain))])
-    knuckles = np.array([0] * 6 + [joint for chain in fingers for joint in (chain[0], *[0] * len(chain))])
-    bones = np.where(joints < hand.bone_count, joints, hand.parents[joints])
+    thumb_places = [(joint, 1.0, joint) for joint in thumb[1:]]
+    places = [(middle_knuckle, 0.5 * (1.0 + METACARPAL_BASE), 0), (0, 1.0, 0), *thumb_places]
+    for knuckle, *beyond in fingers:
+        places += [(knuckle, METACARPAL_BASE, 0), *((joint, 1.0, joint) for joint in (knuckle, *beyond))]
+    joints, shares, ends = (np.array(column) for column in zip(*places, strict=True))
+    bones = np.where(ends < hand.bone_count, ends, hand.parents[ends])
     right = _bone_frames(hand)[bones]
-    return OpenXrFrames(joints, bones, knuckles, fingers[1][0], np.stack([right, mirror_quats(right)]))
+    return OpenXrFrames(joints, shares, bones, np.stack([right, mirror_quats(right)]))
 
 
 def _bone_frames(hand: Hand) -> Array:

@@ -79,7 +79,7 @@ def _add_targets(
         for a in range(CHAIN_LENGTH):
             for i in range(3):
                 slope[a] += TARGET_WEIGHT * columns[a, i] * (targets[j, i] - positions[j, i])
-            for b in range(CHAIN_LENGTH):
+            for b in range(a + 1):
                 for i in range(3):
                     normal[a, b] += TARGET_WEIGHT * columns[a, i] * columns[b, i]
 
@@ -125,13 +125,14 @@ def _add_surface(
                     row[k] = nx * jx + ny * jy + nz * jz
             for a in range(CHAIN_LENGTH):
                 slope[a] += weight * row[a] * depth
-                for b in range(CHAIN_LENGTH):
+                for b in range(a + 1):
                     normal[a, b] += weight * row[a] * row[b]
 
 
 @inner
 def _solve_in_place(normal: Array, slope: Array):
-    """Cholesky solve of the positive definite 4 x 4 system; the solution replaces `slope`."""
+    """Cholesky solve of the positive definite 4 x 4 system, of which only the lower triangle is read; the solution
+    replaces `slope`."""
     for i in range(CHAIN_LENGTH):
         for j in range(i + 1):
             total = normal[i, j]

@@ -13,11 +13,12 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, stack_array
-from manipnet.synthesis.hand.hand import MAX_ANGLES, Chains, Hand, Skeleton
+from manipnet.synthesis.hand.hand import MAX_ANGLES, Hand, Indices, Skeleton
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
+from manipnet.synthesis.hand.packed import unpack_chains, unpack_skeleton
 from manipnet.synthesis.ik.correction import Problem, correct_nothing
 from manipnet.synthesis.ik.solvers import solver_named
-from manipnet.synthesis.model.decode import decode_into
+from manipnet.synthesis.model.decode import decode_into, unpack_output_columns
 from manipnet.synthesis.model.features import Windows
 from manipnet.synthesis.model.layout import OutputColumns
 from manipnet.synthesis.objects.shape import Solid
@@ -96,9 +97,8 @@ def _settle(skeleton: Skeleton, predicted: Array, axes: Array, n: int, poses: Po
 
 
 def _pose(
-    skeleton: Skeleton,
-    chains: Chains,
-    columns: OutputColumns,
+    hand: np.ndarray,
+    starts: Indices,
     solid: Solid,
     windows: Windows,
     outputs: np.ndarray,
@@ -111,6 +111,7 @@ def _pose(
 ):
     """Pose hands `first … last - 1`, all about `solid`, from the network's `outputs (N, output_size)` and the angles
     `before (N, A)` of the last tick."""
+    skeleton, chains, columns = unpack_skeleton(hand), unpack_chains(hand), unpack_output_columns(starts)
     axes, predicted = _axes(), _angles()
     for n in range(first, last):
         _predict(skeleton, columns, outputs[n], before[n], response, limits, axes, n, poses, predicted)

@@ -6,7 +6,8 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import kernel, matrix, vector
-from manipnet.synthesis.hand.hand import Hand, Sensors
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.packed import unpack_sensors
 from manipnet.synthesis.ik.targets import place_targets
 from manipnet.synthesis.model.layout import AMBIENT_CELLS
 from manipnet.synthesis.objects.shape import Shape, Solid
@@ -56,14 +57,14 @@ def take_snapshot(
         np.empty((hand.joint_count, 3)),
     )
     place = wrist, obj, mirrored, float(scale)
-    traced = _sense(hand.sensors, shape.solid, *place, positions, rotations, raw_positions, distances, rays, snapshot)
+    traced = _sense(hand.packed, shape.solid, *place, positions, rotations, raw_positions, distances, rays, snapshot)
     read_rays(shape.rays, rays, traced, np.array([scale], np.float64), readings)
     return snapshot
 
 
 @kernel
 def _sense(
-    sensors: Sensors,
+    hand: np.ndarray,
     solid: Solid,
     wrist: Array,
     obj: Array,
@@ -76,7 +77,8 @@ def _sense(
     rays: Rays,
     snapshot: SensorSnapshot,
 ):
-    rotation, translation, count = matrix(), vector(), len(sensors.bones)
+    sensors, rotation, translation = unpack_sensors(hand), matrix(), vector()
+    count = len(sensors.bones)
     object_from_wrist(wrist, obj, mirrored, rotation, translation)
     sense_ambient(solid.field, sensors.grid_center, rotation, translation, scale, snapshot.ambient)
     place_sensors(sensors, positions, rotations, snapshot.points, snapshot.normals)

@@ -4,12 +4,19 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, stack_array
-from manipnet.synthesis.hand.hand import MAX_JOINTS, Hand, Skeleton
+from manipnet.synthesis.hand.hand import MAX_JOINTS, Hand, Indices, Skeleton
 from manipnet.synthesis.hand.kinematics import angles_from_rotations_into
+from manipnet.synthesis.hand.packed import unpack_skeleton
 from manipnet.synthesis.model.layout import OUTPUT_DISTANCE_MAX_M, OutputColumns, layout_of
 from manipnet.synthesis.rotations import set_identity
 
 _distances, _rotations = stack_array(MAX_JOINTS), stack_array(MAX_JOINTS, 3, 3)
+
+
+@inner
+def unpack_output_columns(starts: Indices):
+    """The first columns of the output blocks, from `Layout.output_starts`."""
+    return OutputColumns(starts[0], starts[1], starts[2])
 
 
 @inner
@@ -65,7 +72,8 @@ def decode_into(
 
 
 @kernel
-def _decode_batch(skeleton: Skeleton, columns: OutputColumns, outputs: Array, limits: Array, angles: Array):
+def _decode_batch(hand: np.ndarray, starts: Indices, outputs: Array, limits: Array, angles: Array):
+    skeleton, columns = unpack_skeleton(hand), unpack_output_columns(starts)
     distances, rotations = _distances(), _rotations()
     for n in range(len(outputs)):
         decode_into(skeleton, columns, outputs[n], limits[:, 0], 1.0, limits, rotations, angles[n], distances)
@@ -74,5 +82,5 @@ def _decode_batch(skeleton: Skeleton, columns: OutputColumns, outputs: Array, li
 def angles_from_outputs(hand: Hand, outputs: Array, limits: Array) -> Array:
     """The angles `(N, A)` inside `limits (A, 2)` of network outputs `(N, output_size)`, without smoothing."""
     angles = np.empty((len(outputs), hand.angle_count))
-    _decode_batch(hand.skeleton, layout_of(hand).output_columns, outputs, limits, angles)
+    _decode_batch(hand.packed, layout_of(hand).output_starts, outputs, limits, angles)
     return angles

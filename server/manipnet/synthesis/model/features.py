@@ -10,7 +10,8 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, matrix, stack_array, vector
-from manipnet.synthesis.hand.hand import MAX_JOINTS, MAX_SENSORS, Hand, Indices, Sensors
+from manipnet.synthesis.hand.hand import MAX_JOINTS, MAX_SENSORS, Hand, Indices
+from manipnet.synthesis.hand.packed import unpack_sensors, unpack_skeleton
 from manipnet.synthesis.model.layout import (
     AMBIENT_CELLS,
     OUTPUT_DISTANCE_MAX_M,
@@ -82,9 +83,8 @@ def sense(
     `rays` has room for all of them (`rays_of`).
     """
     traced = _all_but_readings(
-        hand.parents,
-        hand.sensors,
-        layout.input_columns,
+        hand.packed,
+        layout.input_starts,
         shape.solid,
         windows,
         positions,
@@ -101,7 +101,7 @@ def pose_outputs(hand: Hand, positions: Array, rotations: Array, distances: Arra
     """Network outputs `(N, output_size)` float32 that mean a pose and its signed joint distances `(N, J)`."""
     layout = layout_of(hand)
     rows = np.empty((len(positions), layout.output_size), np.float32)
-    _all_pose_rows(hand.parents, layout.output_columns.joint_axes, positions, rotations, rows)
+    _all_pose_rows(hand.parents, layout.output["joint_axes"].start, positions, rotations, rows)
     rows[:, layout.output["distances"].columns] = np.clip(distances, 0.0, OUTPUT_DISTANCE_MAX_M)
     return rows
 
@@ -141,6 +141,13 @@ def _pose_rows(
 @kernel
 def _all_pose_rows(parents: Indices, axes_column: int, positions: Array, rotations: Array, rows: np.ndarray):
     _pose_rows(parents, axes_column, positions, rotations, 0, len(rows), rows)
+
+
+@inner
+def _unpack_columns(starts: Indices):
+    """The first columns of the input blocks, from `Layout.input_starts`."""
+    s = starts
+    return InputColumns(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10])
 
 
 @inner
@@ -197,9 +204,8 @@ def _trajectory_row(
 
 @kernel
 def _all_but_readings(
-    parents: Indices,
-    sensors: Sensors,
-    columns: InputColumns,
+    hand: np.ndarray,
+    starts: Indices,
     solid: Solid,
     windows: Windows,
     positions: Array,
@@ -210,12 +216,13 @@ def _all_but_readings(
     rows: np.ndarray,
 ):
     """Every block of some rows except the readings of rays that must be traced; returns how many these are."""
+    skeleton, sensors, columns = unpack_skeleton(hand), unpack_sensors(hand), _unpack_columns(starts)
     rotation, translation = matrix(), vector()
     points, directions = _sensor_vectors(), _sensor_vectors()
     distances, normals = _joint_numbers(), _joint_vectors()
     box, traced = solid.bvh.boxes[0], 0
-    joints, count = len(parents), len(sensors.bones)
-    _pose_rows(parents, columns.joint_axes, positions, rotations, first, last, rows)
+    joints, count = len(skeleton.parents), len(sensors.bones)
+    _pose_rows(skeleton.parents, columns.joint_axes, positions, rotations, first, last, rows)
     for n in range(first, last):
         row, mirrored, scale = rows[n], windows.mirrored[n], windows.scale[n]
         wrist, obj = windows.wrist[n], windows.object[n]

@@ -48,7 +48,7 @@ class Block:
 
 
 class InputColumns(NamedTuple):
-    """The first column of each input block, as compiled code takes it."""
+    """The first column of each input block, for compiled code."""
 
     joint_positions: int
     joint_axes: int
@@ -64,7 +64,7 @@ class InputColumns(NamedTuple):
 
 
 class OutputColumns(NamedTuple):
-    """The first column of each output block, as compiled code takes it."""
+    """The first column of each output block, for compiled code."""
 
     joint_positions: int
     joint_axes: int
@@ -98,8 +98,9 @@ class Layout:
         """Output blocks by name, in order."""
         self.input_size = self.input["surface_normals"].stop
         self.output_size = self.output["distances"].stop
-        self.input_columns = InputColumns(**{name: block.start for name, block in self.input.items()})
-        self.output_columns = OutputColumns(**{name: block.start for name, block in self.output.items()})
+        self.input_starts = np.array([self.input[name].start for name in InputColumns._fields])
+        self.output_starts = np.array([self.output[name].start for name in OutputColumns._fields])
+        """Of the blocks, in the order of `InputColumns` and `OutputColumns`: as arguments of kernels."""
         self.encoded = {
             "pose": slice(0, self.input["joint_axes"].stop),
             "trajectory": slice(self.input["wrist_positions"].start, self.input["object_angular_velocities"].stop),
