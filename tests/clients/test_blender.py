@@ -1,33 +1,41 @@
-"""The Blender extension on a fake `bpy`: live on an armature and as empties, keyframes in bulk, nothing left behind."""
+"""The packaged Blender extension on a fake `bpy`: live on an armature and as empties, keyframes, a clean exit."""
 
 import importlib
 import sys
 import threading
 import time
 import tomllib
+import zipfile
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from checkout import CLIENTS, publishing
+from blender import package
+from checkout import ROOT, publishing
 from joint_poses import assert_joints
 from manipnet_client import decode
 from manipnet_client.retarget import BONES
 from test_retarget import ENDS, posed
 
+from manipnet import __version__
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate, quat_to_matrix
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.wire import encode_binary
 
-EXTENSION = CLIENTS / "blender" / "manipnet_live"
 FAKE = ("bpy", "mathutils", "manipnet_live")
 
 
+@pytest.fixture(scope="module")
+def packaged(tmp_path_factory):
+    """The folder that holds the extension as packaging writes it."""
+    return package.write_unpacked(tmp_path_factory.mktemp("extensions")).parent
+
+
 @pytest.fixture
-def blender(monkeypatch):
+def blender(packaged, monkeypatch):
     """The extension, registered in a fresh fake Blender."""
-    monkeypatch.syspath_prepend(str(CLIENTS.parent / "tests" / "clients" / "fake_blender"))
-    monkeypatch.syspath_prepend(str(EXTENSION.parent))
+    monkeypatch.syspath_prepend(str(ROOT / "tests" / "clients" / "fake_blender"))
+    monkeypatch.syspath_prepend(str(packaged))
     extension = importlib.import_module("manipnet_live")
     extension.register()
     yield SimpleNamespace(extension=extension, session=extension.session, bpy=sys.modules["bpy"])
@@ -214,8 +222,15 @@ def test_the_panel_tells_what_goes_on(blender):
     assert drawn[-1].endswith(" lost")
 
 
-def test_manifest():
-    manifest = tomllib.loads((EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8"))
+def test_the_zip_holds_the_manifest_and_the_client(tmp_path):
+    path = package.write_zip(tmp_path / "dist")
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+    assert path.name == f"manipnet_live-{__version__}.zip"
+    assert {"__init__.py", "manipnet_client/__init__.py", "manipnet_client/layout.py"} <= set(names)
+    assert not [name for name in names if "__pycache__" in name or name.endswith(".md")]
+    assert manifest["version"] == __version__
     assert manifest["blender_version_min"] == "4.2.0"
-    assert manifest["id"] == EXTENSION.name
+    assert manifest["id"] == package.EXTENSION.name
     assert set(manifest["permissions"]) == {"network"}
