@@ -11,7 +11,7 @@ from live_server import Stage, serving
 from tiny_bundle import write_tiny_bundle
 
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
 
 # the first example pays for compiling; the same examples every run
@@ -70,5 +70,5 @@ def heard():
 
 
 @pytest.fixture
-def counters():
-    return Counters()
+def telemetry():
+    return Telemetry()

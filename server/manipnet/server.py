@@ -39,7 +39,7 @@ from manipnet.runtime.warm_up import pose_a_hand, warm_up
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import Synthesizer
-from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.telemetry import Telemetry
 
 if TYPE_CHECKING:
     from manipnet.demo.player import Demo
@@ -77,10 +77,11 @@ class Server:
         check(config)
         self._config, self._say = config, say
         self.session = secrets.token_hex(8)
-        self.counters, self.timings = Counters(), Timings()
-        self._mailbox, self._watch = Mailbox(self.counters), SilenceWatch()
+        self.telemetry = Telemetry()
+        self._mailbox, self._watch = Mailbox(self.telemetry), SilenceWatch()
         self._catalog = ObjectCatalog(config.objects, config.objects_unit)
         self._around = Peers(self._mailbox.put)
+        self.telemetry.add_gauges(self._around.gauges)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model, config.provider)
         pose_a_hand(self._bundle)
@@ -109,22 +110,22 @@ class Server:
 
     def _open(self, opened: ExitStack) -> tuple[TickLoop, dict[str, str]]:
         """Every socket, and the loop between them; `opened` closes them in reverse order."""
-        config, counters = self._config, self.counters
+        config, telemetry = self._config, self.telemetry
         actors_proxy = ActorsProxy(self._actors, self._mailbox)
-        recorder = Recorder(config.takes, lambda: self._about(actors_proxy), counters)
+        recorder = Recorder(config.takes, lambda: self._about(actors_proxy), telemetry)
         opened.callback(recorder.stop)
-        publisher = Publisher(config, counters, self._keys, recorder.note)
+        publisher = Publisher(config, telemetry, self._keys, recorder.note)
         opened.callback(publisher.close)
         meshes = MeshWatch(self._catalog, lambda old, new: actors_proxy.ask(lambda: self._reshape(old, new)))
         opened.callback(meshes.stop)
         meshes.start()
         handlers = {**self._handlers(actors_proxy), **recorder.handlers()}
         handlers |= self._around.handlers(handlers["status"])
-        control = Control(config.host, config.control_port, handlers, counters, self._keys)
+        control = Control(config.host, config.control_port, handlers, telemetry, self._keys)
         opened.callback(control.stop)
         control.start()
         page_host = LOOPBACK if self._keys is not None else config.host  # browsers have no keys
-        page = LivePage(page_host, config.page_port, control.answer, counters)
+        page = LivePage(page_host, config.page_port, control.answer, telemetry)
         opened.callback(page.stop)
         page.start()
         bodies = self._zmq_bodies()
@@ -145,23 +146,20 @@ class Server:
             self._around.motive = self._motive(*config.natnet)
             addresses["natnet"] = self._listen(opened, "--natnet", self._around.motive)
         if config.metrics_port is not None:
-            metrics = MetricsPage(LOOPBACK, config.metrics_port, counters, self.timings, self._around.gauges)
+            metrics = MetricsPage(LOOPBACK, config.metrics_port, telemetry)
             opened.callback(metrics.close)
             addresses["metrics"] = metrics.address
         return self._loop(publisher, page), addresses
 
     def _loop(self, publisher: Publisher, page: LivePage) -> TickLoop:
-        stages = StageClock(self.timings)
         return TickLoop(
             self.session,
             self._actors,
-            Synthesizer(self._bundle, on_stage=stages.ended),
-            stages,
+            Synthesizer(self._bundle, on_stage=self.telemetry.stages.ended),
             publisher.publish,
             self._mailbox,
             FlightRecorder(self._config.dump_dir or user_log_path("manipnet", appauthor=False)),
-            self.counters,
-            self.timings,
+            self.telemetry,
             page,
         )
 
@@ -172,8 +170,7 @@ class Server:
             self._bundle.model_hash,
             actors_proxy,
             self._catalog,
-            self.counters,
-            self.timings,
+            self.telemetry,
         )
         return {**requests.handlers(), **CalibrationRequests(actors_proxy, self._config.rig).handlers()}
 
@@ -193,16 +190,16 @@ class Server:
 
     def _zmq_bodies(self) -> ZmqBodies:
         config = self._config
-        return ZmqBodies(self._around.sink, self.counters, config.host, config.input_port, self._keys)
+        return ZmqBodies(self._around.sink, self.telemetry, config.host, config.input_port, self._keys)
 
     def _osc_bodies(self) -> OscBodies:
         config = self._config
-        return OscBodies(self._around.sink, self.counters, config.host, config.osc_port, config.allow or None)
+        return OscBodies(self._around.sink, self.telemetry, config.host, config.osc_port, config.allow or None)
 
     def _motive(self, host: str, port: int) -> NatNetBodies:
         return NatNetBodies(
             self._around.sink,
-            self.counters,
+            self.telemetry,
             host,
             port,
             multicast=self._config.multicast,
@@ -220,7 +217,7 @@ class Server:
 
     def _actor(self, config: ActorConfig) -> Actor:
         props = [self._catalog.load(thing) for thing in config.objects]
-        return Actor(config, props, self._bundle, self.counters, self._config.look_ahead_s)
+        return Actor(config, props, self._bundle, self.telemetry, self._config.look_ahead_s)
 
     def _listen(self, opened: ExitStack, option: str, receiver: Receiver) -> str:
         try:
@@ -232,6 +229,6 @@ class Server:
 
     def _every_second(self, now_s: float) -> None:
         shown = sum(actor.seq for actor in self._actors)
-        self._say(second_line(self._actors, self.counters, self.timings, shown - self._shown))
+        self._say(second_line(self._actors, self.telemetry, shown - self._shown))
         self._shown = shown
         self._watch.look(self._actors, now_s)

@@ -29,7 +29,7 @@ from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Side, Synthesizer
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 SIDES: tuple[Side, Side] = ("left", "right")
@@ -211,7 +211,7 @@ def around(shape_scale: float, t_s: float, size: float) -> dict[str, Array]:
 
 def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array], size: float = 1.0) -> Array:
     """Angles `(ticks, 2, 20)` of an actor whose tracker sees the wrists through `clusters`, T_wrist_cluster each."""
-    actor = Actor(config, [Prop("box", "cube", shape)], bundle, Counters(), 0.1)
+    actor = Actor(config, [Prop("box", "cube", shape)], bundle, Telemetry(), 0.1)
     actor.carry("box", "cube", shape, 1.4 * size)
     synthesizer, shown = Synthesizer(bundle), []
     for i in range(round(SECONDS * 120)):
@@ -265,7 +265,7 @@ def test_a_new_offset_takes_the_past_along(bundle, cube: Shape) -> None:
     offset = pose((0.02, 0.03, -0.01), (0.1, 0.3, -0.2, 0.9))
     actors = {}
     for name, config in (("late", actor_config()), ("always", actor_config({"right_wrist": offset}))):
-        actor = Actor(config, [Prop("box", "cube", cube)], bundle, Counters(), 0.1)
+        actor = Actor(config, [Prop("box", "cube", cube)], bundle, Telemetry(), 0.1)
         for i in range(60):
             T = around(1.4, i / 120, 1.0)["right_wrist"]
             sample = BodySample(None, "right_wrist", tuple(T[:3]), tuple(T[3:]), True)

@@ -11,7 +11,7 @@ from manipnet.actors.output_guard import MAX_SPEED_RAD_S, MAX_WRIST_RAD_S, NotFi
 from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, Shown, State, state_at_age
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
 from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import TICK_S
 
 REST = DOF_LIMITS_RAD.mean(axis=1)
@@ -21,7 +21,7 @@ THERE = np.concatenate([[0.6, 1.2, -0.3], quat_exp(np.array([0.0, 1.5, 0.3]))])
 
 
 def presence() -> PoseTransition:
-    return PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, Counters()))
+    return PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, Telemetry()))
 
 
 def run(
@@ -152,14 +152,14 @@ def test_the_first_pose_shown_is_inside_the_limits_too() -> None:
 
 
 def test_angles_outside_the_limits_or_too_fast_are_kept_in_and_counted() -> None:
-    counters = Counters()
-    hand = PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, counters))
+    telemetry = Telemetry()
+    hand = PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, telemetry))
     run(hand, 1, "live", DOF_LIMITS_RAD[:, 0], HERE)
     (shown,) = run(hand, 1, "live", FIST + 1.0, HERE)
     steps = shown.angles - DOF_LIMITS_RAD[:, 0]
     assert steps.max() == pytest.approx(MAX_SPEED_RAD_S * TICK_S)
     assert np.all(shown.angles <= FIST)
-    assert counters.snapshot()["output_guarded"] == {"limit": 1, "speed": 1}
+    assert telemetry.counts()["output_guarded"] == {"limit": 1, "speed": 1}
 
 
 def test_a_wrist_that_was_guessed_glides_to_where_it_is() -> None:

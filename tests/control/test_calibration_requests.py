@@ -17,7 +17,7 @@ from manipnet.control.request import RequestError
 from manipnet.geometry import compose, invert, quat_exp
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.synthesis.hand.skeleton import DOF_COUNT, DOF_LIMITS_RAD
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 RIG = '# mine\n[bodies]\nleft_wrist = "left_wrist"  # taped\nright_wrist = "right_wrist"\n'
@@ -36,7 +36,7 @@ def rig(tmp_path: Path) -> Path:
 @pytest.fixture
 def actors_proxy(rig: Path) -> Iterator[ActorsProxy]:
     bundle = SimpleNamespace(rest_angles=np.zeros(DOF_COUNT), limits=DOF_LIMITS_RAD)
-    mailbox, stop = Mailbox(Counters()), threading.Event()
+    mailbox, stop = Mailbox(Telemetry()), threading.Event()
 
     def tick() -> None:
         while not stop.is_set():
@@ -44,7 +44,7 @@ def actors_proxy(rig: Path) -> Iterator[ActorsProxy]:
 
     thread = threading.Thread(target=tick)
     thread.start()
-    yield ActorsProxy([Actor(load_rig(rig).actors[0], [], bundle, Counters(), 0.0)], mailbox)  # pyright: ignore
+    yield ActorsProxy([Actor(load_rig(rig).actors[0], [], bundle, Telemetry(), 0.0)], mailbox)  # pyright: ignore
     stop.set()
     thread.join()
 

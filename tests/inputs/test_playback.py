@@ -14,7 +14,7 @@ from manipnet.inputs.osc.receiver import OscBodies
 from manipnet.inputs.osc.writer import osc_datagrams
 from manipnet.inputs.playback import OscBodySender, PlayError, looped, play
 from manipnet.inputs.zeromq import ZmqBodies
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import TICK_S
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError
 from manipnet_tools import cli
@@ -51,7 +51,7 @@ class Receiving:
     def __init__(self, kind: str) -> None:
         self.heard: queue.Queue[BodyFrame] = queue.Queue()
         make = ZmqBodies if kind == "tcp" else OscBodies
-        self.receiver = make(self.heard.put, Counters(), port=0)
+        self.receiver = make(self.heard.put, Telemetry(), port=0)
         self.receiver.start()
         self.url = f"{kind}://{self.receiver.address.partition('://')[2]}"
 

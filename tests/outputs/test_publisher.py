@@ -22,7 +22,7 @@ from manipnet.net.curve_keys import (
 from manipnet.net.curve_keys import read_client_keys as read_keys
 from manipnet.net.zap import secure_client
 from manipnet.outputs.publisher import Publisher
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
 
 CONFIG = ServerConfig((default_actor(),), port=0, web_port=0)
@@ -37,13 +37,13 @@ def context():
 
 
 @pytest.fixture
-def counters():
-    return Counters()
+def telemetry():
+    return Telemetry()
 
 
 @pytest.fixture
-def publisher(counters):
-    publisher = Publisher(CONFIG, counters)
+def publisher(telemetry):
+    publisher = Publisher(CONFIG, telemetry)
     yield publisher
     publisher.close()
 
@@ -108,9 +108,9 @@ def test_a_list_that_cannot_be_read_is_named_and_leaves_nothing_open(tmp_path):
     keys.allow_file.unlink()
     threads = threading.active_count()
     for start in (
-        lambda: Publisher(CONFIG, Counters(), keys),
-        lambda: Control("127.0.0.1", 0, {}, Counters(), keys),
-        ZmqBodies(print, Counters(), port=0, keys=keys).start,
+        lambda: Publisher(CONFIG, Telemetry(), keys),
+        lambda: Control("127.0.0.1", 0, {}, Telemetry(), keys),
+        ZmqBodies(print, Telemetry(), port=0, keys=keys).start,
     ):
         with pytest.raises(KeyFileError, match=r"cannot read .*clients\.allow"):
             start()
@@ -128,7 +128,7 @@ STRANGERS = {
 def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, tmp_path, keys, reason):
     make_server_keys(tmp_path)
     server, friend = read_server_keys(tmp_path), read_keys(make_client_keys(tmp_path, "stage-pc"))
-    frames, hands, bodies, control = [], Counters(), Counters(), Counters()
+    frames, hands, bodies, control = [], Telemetry(), Telemetry(), Telemetry()
     with ExitStack() as opened:
         publisher = Publisher(CONFIG, hands, server)
         opened.callback(publisher.close)
@@ -150,16 +150,16 @@ def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, t
         asking.send(b'{"op": "ping"}')
         good = opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_MSGPACK, friend))
         seq = publish_until_heard(publisher, [good])
-        for counters in (hands, bodies, control):
+        for telemetry in (hands, bodies, control):
             for _ in range(2_000):
-                if counters.snapshot().get("connections_refused", {}).get(reason):
+                if telemetry.counts().get("connections_refused", {}).get(reason):
                     break
                 good.poll(10)
                 seq += 1
                 publisher.publish(message(seq, seq / 60, 0.1))
-            assert counters.snapshot()["connections_refused"][reason] >= 1
+            assert telemetry.counts()["connections_refused"][reason] >= 1
         assert not watching.poll(0)
         assert not sending.poll(0), "the server subscribes to a stranger"
         assert not asking.poll(0)
-    assert "control_requests" not in control.snapshot()
+    assert "control_requests" not in control.counts()
     assert frames == []

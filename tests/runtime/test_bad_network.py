@@ -17,7 +17,7 @@ from test_tick_loop import Bench, actor, frame
 from manipnet.actors.props import Prop
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import TICK_HZ, TICK_S
 from manipnet.wire import HandsMessage
 
@@ -40,10 +40,10 @@ def receive(bundle: Bundle, tmp_path: Path):
     shape = ObjectCatalog().shape("cube")
 
     def run(arrive: Arrive, look_ahead_s: float) -> list[HandsMessage]:
-        counters = Counters()
-        one = actor(bundle, ObjectCatalog(), counters, Prop("Box", "cube", shape))
+        telemetry = Telemetry()
+        one = actor(bundle, ObjectCatalog(), telemetry, Prop("Box", "cube", shape))
         one.timeline.look_ahead_s = look_ahead_s
-        bench = Bench(bundle, tmp_path, [one], counters)
+        bench = Bench(bundle, tmp_path, [one], telemetry)
         sent = [i / RATE_HZ for i in range(round(SECONDS * RATE_HZ))]
         arrivals = sorted((at_s, t_s) for t_s in sent for at_s in arrive(t_s))
         for now_s in np.arange(0.0, SECONDS + 1.0, STEP_S).tolist():

@@ -18,7 +18,7 @@ from manipnet.runtime.shape_process import make_shape
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.objects.library import library_names
 from manipnet.synthesis.objects.mesh import MeshError
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 LIBRARY = {
@@ -163,7 +163,7 @@ class Scene:
     def __init__(self, bundle: Bundle, catalog: ObjectCatalog) -> None:
         shape = catalog.shape("cube")
         self.actor = Actor(
-            default_actor(), [Prop("cup", "cube", shape), Prop("pot", "cube", shape)], bundle, Counters(), 0.0
+            default_actor(), [Prop("cup", "cube", shape), Prop("pot", "cube", shape)], bundle, Telemetry(), 0.0
         )
         for prop in self.actor.props:
             self.actor.carry(prop.name, prop.object, prop.shape, 1.0)

@@ -15,7 +15,7 @@ from manipnet.synthesis.hand.skeleton import DOF_NAMES
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Side, state_of
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import TICK_S, BodyAtTick, BodyHealth, Tick, Timeline
 from manipnet.wire.bodies import BodyFrame, BodySample
 
@@ -37,13 +37,13 @@ class ShownHand:
 class LiveHand:
     """One hand's memory: what it was synthesised to, what it shows, and which prop it is about."""
 
-    def __init__(self, side: Side, rest_angles: Array, limits: Array, counters: Counters) -> None:
+    def __init__(self, side: Side, rest_angles: Array, limits: Array, telemetry: Telemetry) -> None:
         self.side: Side = side
         self.prop: str | None = None
         self.resting = False
         """Asked to rest: no synthesis until the hand has eased there."""
         self._rest_angles = rest_angles
-        self._presence = PoseTransition(rest_angles, OutputGuard(limits, counters))
+        self._presence = PoseTransition(rest_angles, OutputGuard(limits, telemetry))
         self.memory = state_of(rest_angles)
 
     @property
@@ -90,7 +90,7 @@ class Actor:
     """An actor's bodies in, its hands out. Not thread-safe: belongs to the tick thread."""
 
     def __init__(
-        self, config: ActorConfig, props: Sequence[Prop], bundle: Bundle, counters: Counters, look_ahead_s: float
+        self, config: ActorConfig, props: Sequence[Prop], bundle: Bundle, telemetry: Telemetry, look_ahead_s: float
     ) -> None:
         self.config = config
         self.timeline = Timeline(look_ahead_s)
@@ -101,7 +101,7 @@ class Actor:
         limits = _limits(config, bundle.limits)
         rest_angles = np.clip(bundle.rest_angles, *limits.T)
         self.hands: dict[Side, LiveHand] = {
-            side: LiveHand(side, rest_angles, limits, counters) for side in SIDES if f"{side}_wrist" in config.wrists
+            side: LiveHand(side, rest_angles, limits, telemetry) for side in SIDES if f"{side}_wrist" in config.wrists
         }
         self._parts, self._offsets = _parts(config), _offsets(config)
         self._last: tuple[int, int] | None = None

@@ -7,7 +7,7 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.limits import keep_angles
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 
 MAX_SPEED_RAD_S: Final = 40.0
 """The fastest captured finger reaches 35; only an error moves faster than this."""
@@ -23,8 +23,8 @@ class NotFiniteError(ArithmeticError):
 class OutputGuard:
     """Keeps finger angles harmless, and counts what it had to change."""
 
-    def __init__(self, limits: Array, counters: Counters) -> None:
-        self._limits, self._counters = limits, counters
+    def __init__(self, limits: Array, telemetry: Telemetry) -> None:
+        self._limits, self._telemetry = limits, telemetry
 
     def check(self, angles: Array | None, wrist: Array | None) -> None:
         """Raise `NotFiniteError` for `angles (20,)` or a `wrist (7,)` that nobody may see."""
@@ -46,18 +46,18 @@ class OutputGuard:
         """Whether a wrist may go so far within `dt_s`."""
         reachable = step_m <= MAX_WRIST_M_S * dt_s and turn_rad <= MAX_WRIST_RAD_S * dt_s
         if not reachable:
-            self._counters.add("output_guarded", reason="speed")
+            self._telemetry.count("output_guarded", reason="speed")
         return reachable
 
     def _refuse(self, what: str) -> None:
-        self._counters.add("output_guarded", reason="not_finite")
+        self._telemetry.count("output_guarded", reason="not_finite")
         raise NotFiniteError(what)
 
     def _kept(self, angles: Array, last: Array, reach: float) -> Array:
         kept = np.empty_like(angles)
         beyond_limits, too_fast = keep_angles(angles, self._limits, last, reach, kept)
         if beyond_limits:
-            self._counters.add("output_guarded", reason="limit")
+            self._telemetry.count("output_guarded", reason="limit")
         if too_fast:
-            self._counters.add("output_guarded", reason="speed")
+            self._telemetry.count("output_guarded", reason="speed")
         return kept

@@ -9,7 +9,7 @@ from manipnet.control.request import Handler, Request, RequestError, number
 from manipnet.inputs.base import Sink
 from manipnet.inputs.natnet.client import STATES, NatNetBodies
 from manipnet.inputs.sender_stats import SenderStats
-from manipnet.runtime.prometheus import Gauge
+from manipnet.telemetry import Gauge
 from manipnet.wire.bodies import MessageError, check_name
 
 MOST_CLOCKS: Final = 64

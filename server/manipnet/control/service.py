@@ -16,7 +16,7 @@ from manipnet.net.access_control import AccessControl
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.rate_limit import Throttle
 from manipnet.net.zmq_socket import bind, zmq_endpoint
-from manipnet.telemetry import CONTROL_OPS, Counters
+from manipnet.telemetry import CONTROL_OPS, Telemetry
 
 MAX_REQUEST_BYTES: Final = 4096
 REQUESTS_PER_S: Final = 200
@@ -36,11 +36,11 @@ class Control:
         host: str,
         port: int,
         handlers: Mapping[str, Handler],
-        counters: Counters,
+        telemetry: Telemetry,
         keys: ServerKeys | None = None,
     ) -> None:
         """Binds; raises `ListenError`. `start` begins to answer. With `keys` only clients on their list may ask."""
-        self._handlers, self._counters, self._throttle = handlers, counters, Throttle(REQUESTS_PER_S, BURST)
+        self._handlers, self._telemetry, self._throttle = handlers, telemetry, Throttle(REQUESTS_PER_S, BURST)
         endpoint, ipv6 = zmq_endpoint(host, port)
         self._context = zmq.Context()
         rep = self._context.socket(zmq.REP)
@@ -52,7 +52,7 @@ class Control:
         rep.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
         rep.setsockopt(zmq.IPV6, int(ipv6))
         try:
-            self._access = AccessControl(self._context, rep, counters, keys)
+            self._access = AccessControl(self._context, rep, telemetry, keys)
             bind(rep, endpoint, "--control-port")
         except BaseException:
             rep.close()
@@ -109,7 +109,7 @@ class Control:
         except Exception as error:
             _log.exception("control: %s failed", op)
             reply = {"error": f"{op} failed inside the server: {type(error).__name__}: {error}"}
-        self._counters.add("control_requests", op=op)
+        self._telemetry.count("control_requests", op=op)
         return json.dumps(reply).encode() if as_json else msgpack.packb(reply) or b""
 
 

@@ -19,7 +19,7 @@ from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
 from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import UNITS_M, MeshError
-from manipnet.telemetry import Counters, Timings
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import TICK_HZ
 from manipnet.wire import VERSION
 
@@ -36,12 +36,11 @@ class Requests:
         model_hash: str,
         actors_proxy: ActorsProxy,
         catalog: ObjectCatalog,
-        counters: Counters,
-        timings: Timings,
+        telemetry: Telemetry,
     ) -> None:
         self._session, self._model, self._model_hash = session, model, model_hash
         self._proxy, self._actors, self._catalog = actors_proxy, actors_proxy.actors, catalog
-        self._counters, self._timings = counters, timings
+        self._telemetry = telemetry
         self._started_s = time.monotonic()
 
     def handlers(self) -> Mapping[str, Handler]:
@@ -75,7 +74,7 @@ class Requests:
 
     def _status(self, _: Request) -> dict[str, Any]:
         now_s = time.monotonic()
-        report = self._proxy.ask(lambda: status(self._actors, self._counters, self._timings, now_s))
+        report = self._proxy.ask(lambda: status(self._actors, self._telemetry, now_s))
         return {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s, **report}
 
     def _objects(self, _: Request) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from manipnet.net.curve_keys import KeyFileError, ServerKeys
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.zmq_socket import harden, zmq_endpoint
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import MAX_MESSAGE_BYTES, MessageError, parse_bodies
 
 
@@ -25,13 +25,13 @@ class ZmqBodies:
     def __init__(
         self,
         sink: Sink,
-        counters: Counters,
+        telemetry: Telemetry,
         host: str = "127.0.0.1",
         port: int = 5556,
         keys: ServerKeys | None = None,
     ) -> None:
-        self._intake = Intake("zmq", sink, counters)
-        self._counters, self._keys = counters, keys
+        self._intake = Intake("zmq", sink, telemetry)
+        self._telemetry, self._keys = telemetry, keys
         self._guard = SourceRateLimiter()
         self._endpoint, self._ipv6 = zmq_endpoint(host, port)
         self._context: zmq.Context | None = None
@@ -46,7 +46,7 @@ class ZmqBodies:
         harden(subscriber, self._ipv6)
         subscriber.subscribe(b"")
         try:
-            access = AccessControl(context, subscriber, self._counters, self._keys)
+            access = AccessControl(context, subscriber, self._telemetry, self._keys)
             subscriber.bind(self._endpoint)
         except (zmq.ZMQError, KeyFileError) as error:
             subscriber.close()

@@ -14,7 +14,7 @@ from manipnet.net.zmq_socket import bind, zmq_endpoint
 from manipnet.outputs.livelink import LiveLinkJsonSender
 from manipnet.outputs.vmc import VmcSender
 from manipnet.outputs.websocket import WebSocketPublisher
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, encode_binary, encode_msgpack
 
 SEND_HIGH_WATER_MARK = 64
@@ -29,7 +29,7 @@ class Publisher:
     def __init__(
         self,
         config: ServerConfig,
-        counters: Counters,
+        telemetry: Telemetry,
         keys: ServerKeys | None = None,
         record: Callable[[bytes], object] = lambda _: None,
     ) -> None:
@@ -39,14 +39,14 @@ class Publisher:
 
         With `keys` only clients on their list may subscribe, and browsers, which have none, stay on this machine.
         """
-        self._counters, self._keys, self._record = counters, keys, record
+        self._telemetry, self._keys, self._record = telemetry, keys, record
         self._context = zmq.Context()
         self._pub: zmq.Socket | None = None
         self._web: WebSocketPublisher | None = None
         self._senders: list[tuple[str, VmcSender | LiveLinkJsonSender]] = []
         try:
             self._pub = self._bind_pub(config.host, config.port)
-            self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.web_port, counters)
+            self._web = _bind_web("127.0.0.1" if keys is not None else config.host, config.web_port, telemetry)
             if config.vmc is not None:
                 self._senders.append(("vmc", VmcSender(*_resolve("--vmc", config.vmc))))
             if config.livelink is not None:
@@ -74,15 +74,15 @@ class Publisher:
         self._pub.send(TOPIC_MSGPACK + packed)
         self._pub.send(TOPIC_BIN + binary)
         self._record(packed)
-        self._counters.add("messages_out", topic="msgpack")
-        self._counters.add("messages_out", topic="bin")
+        self._telemetry.count("messages_out", topic="msgpack")
+        self._telemetry.count("messages_out", topic="bin")
         if self._web.client_count:
             self._web.publish(binary)
-            self._counters.add("messages_out", topic="web")
+            self._telemetry.count("messages_out", topic="web")
         for topic, sender in self._senders:
             try:
                 sender.send(message)
-                self._counters.add("messages_out", topic=topic)
+                self._telemetry.count("messages_out", topic=topic)
             except OSError as error:
                 _log.warning("%s cannot be sent: %s", topic, error)
 
@@ -107,7 +107,7 @@ class Publisher:
         pub.setsockopt(zmq.MAXMSGSIZE, 1024)  # subscriptions are all that comes in, and CURVE's handshake
         pub.setsockopt(zmq.IPV6, int(ipv6))
         try:
-            self._access = AccessControl(self._context, pub, self._counters, self._keys)
+            self._access = AccessControl(self._context, pub, self._telemetry, self._keys)
             bind(pub, endpoint, "--port")
         except BaseException:
             pub.close()
@@ -115,9 +115,9 @@ class Publisher:
         return pub
 
 
-def _bind_web(host: str, port: int, counters: Counters) -> WebSocketPublisher:
+def _bind_web(host: str, port: int, telemetry: Telemetry) -> WebSocketPublisher:
     try:
-        return WebSocketPublisher(host, port, counters)
+        return WebSocketPublisher(host, port, telemetry)
     except OSError as error:
         raise ListenError(
             f"--web-port: cannot listen on {host}:{port}: {error.strerror or error}; "

@@ -10,7 +10,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 
 MAX_CLIENTS = 32
 QUEUE_LENGTH = 8
@@ -31,8 +31,8 @@ class WebSocketPublisher:
     Raises `OSError` when the address cannot be bound.
     """
 
-    def __init__(self, host: str, port: int, counters: Counters) -> None:
-        self._counters = counters
+    def __init__(self, host: str, port: int, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
         self._clients: dict[asyncio.Event, deque[bytes]] = {}
         self._loop = asyncio.new_event_loop()
         try:
@@ -110,4 +110,4 @@ class WebSocketPublisher:
         news.set()
 
     def _refuse(self, reason: str) -> None:
-        self._counters.add("connections_refused", reason=reason)
+        self._telemetry.count("connections_refused", reason=reason)

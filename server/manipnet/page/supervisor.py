@@ -24,7 +24,7 @@ from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.page.serialization import pack, unpack
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandStep, Side
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import Tick
 from manipnet.wire import HandsMessage
 
@@ -44,11 +44,11 @@ Answer = Callable[[list[bytes]], bytes]
 class LivePage:
     """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, answer: Answer, counters: Counters) -> None:
+    def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry) -> None:
         """Raises `ListenError`. `answer` meets the page's requests, as it does any client's."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._answer, self._counters = answer, counters
+        self._answer, self._telemetry = answer, telemetry
         self.watched = False
         """Whether a browser is open: only then is there anything to `see`."""
         self._news, self._telling = threading.Condition(), threading.Lock()
@@ -68,7 +68,7 @@ class LivePage:
         frame = frame_of(actor, tick, steps, message)
         with self._news:
             if message.actor in self._newest:
-                self._counters.add("page_frames", fate="skipped")
+                self._telemetry.count("page_frames", fate="skipped")
             self._newest[message.actor] = frame, [prop.shape for prop in actor.props]
             self._news.notify()
 
@@ -91,7 +91,7 @@ class LivePage:
                 _log.error("the page: %s: %s", type(error).__name__, error)
             if self._stopping.is_set():
                 return
-            self._counters.add("page_ended", reason="crash")
+            self._telemetry.count("page_ended", reason="crash")
             _log.error("the page's process has ended; the session goes on, and a visit starts the page again")
             pause_s = RESTART_S[0] if time.monotonic() - begin_s > LASTED_S else min(2.0 * pause_s, RESTART_S[1])
             self._stopping.wait(pause_s)
@@ -161,7 +161,7 @@ class LivePage:
                         view = ShapeView(shape.name, shape.content_hash, mesh.vertices, mesh.faces)
                         self._tell(ours, "shape", view)
                 self._tell(ours, "frame", frame)
-                self._counters.add("page_frames", fate="shown")
+                self._telemetry.count("page_frames", fate="shown")
             time.sleep(max(begin_s + 1.0 / FRAMES_HZ - time.monotonic(), 0.0))
 
     def _tell(self, ours: Connection, what: str, content: Any) -> None:

@@ -23,7 +23,7 @@ import msgpack
 from manipnet.actors.props import Prop
 from manipnet.control.request import Handler, Request, RequestError
 from manipnet.geometry import Array
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 
 MAX_WAITING: Final = 7200
 """Messages kept for a disk that is slow, two minutes of one actor; then the newest are lost, and counted."""
@@ -51,9 +51,9 @@ class Take:
 class Recorder:
     """Makes one recording at a time in `folder`. `note` belongs to the tick thread, the rest to the control thread."""
 
-    def __init__(self, folder: Path, about: About, counters: Counters) -> None:
+    def __init__(self, folder: Path, about: About, telemetry: Telemetry) -> None:
         """`about` tells what a recording depends on: its metadata, and the props whose meshes it keeps."""
-        self._folder, self._about, self._counters = folder, about, counters
+        self._folder, self._about, self._telemetry = folder, about, telemetry
         self._waiting: deque[tuple[int, bytes]] = deque()
         self._take: Take | None = None
         self._lock = threading.Lock()
@@ -63,7 +63,7 @@ class Recorder:
         if self._take is None:
             return
         if len(self._waiting) >= MAX_WAITING:
-            self._counters.add("recorded", fate="lost")
+            self._telemetry.count("recorded", fate="lost")
             return
         self._waiting.append((time.time_ns(), payload))
 
@@ -146,7 +146,7 @@ class Recorder:
         while self._waiting:
             time_ns, payload = self._waiting.popleft()
             take.connection.send_bytes(time_ns.to_bytes(8, "little") + payload)
-            self._counters.add("recorded", fate="written")
+            self._telemetry.count("recorded", fate="written")
         if ended:
             take.connection.send_bytes(b"")
         return ended

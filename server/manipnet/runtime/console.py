@@ -9,7 +9,7 @@ import threading
 import time
 from typing import Any, Final
 
-from manipnet.telemetry import RateLimit
+from manipnet.telemetry import RepeatFilter
 
 WAITING_LINES: Final = 200
 LOG_FORMAT: Final = "%(asctime)s %(levelname)s %(name)s: %(message)s"
@@ -38,7 +38,7 @@ class Console(logging.Handler):
     def __init__(self, as_json: bool = False) -> None:
         super().__init__()
         self.setFormatter(JsonFormatter() if as_json else logging.Formatter(LOG_FORMAT))
-        self.addFilter(RateLimit(time.monotonic))
+        self.addFilter(RepeatFilter())
         self._lines: queue.Queue[tuple[str, bool] | None] = queue.Queue(WAITING_LINES)
         self._thread = threading.Thread(target=self._write, name="terminal", daemon=True)
         self._thread.start()

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Final, TypeVar
 
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
 
 MAX_FRAMES: Final = 512
@@ -23,8 +23,8 @@ class BusyError(RuntimeError):
 class Mailbox:
     """Bounded, newest wins. `put` and `ask` from any thread; `wait` from the tick thread only."""
 
-    def __init__(self, counters: Counters) -> None:
-        self._counters = counters
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
         self._news = threading.Condition()
         self._frames: deque[BodyFrame] = deque()
         self._requests: deque[tuple[Callable[[], object], Future]] = deque()
@@ -34,7 +34,7 @@ class Mailbox:
         with self._news:
             if len(self._frames) >= MAX_FRAMES:
                 self._frames.popleft()
-                self._counters.add("frames_dropped", reason="mailbox_full")
+                self._telemetry.count("frames_dropped", reason="mailbox_full")
             self._frames.append(frame)
             self._news.notify()
 

@@ -7,20 +7,21 @@ from typing import Any, Final
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.transitions import state_at_age
-from manipnet.telemetry import Counters, Timings
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import BodyHealth
 
 WARN_AFTER_S: Final = 3.0
 ERROR_AFTER_S: Final = 10.0
+DELAY_PERCENTILES: Final = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
 _log = logging.getLogger(__name__)
 
 
-def second_line(actors: Sequence[Actor], counters: Counters, timings: Timings, rate_hz: float) -> str:
+def second_line(actors: Sequence[Actor], telemetry: Telemetry, rate_hz: float) -> str:
     """One second of a server in one line: rate, delay, both hands of each actor, what was lost."""
     if not any(actor.timeline.running for actor in actors):
         return "waiting for bodies: nothing of the rig has arrived yet (`manipnet doctor` says why)"
-    p50, p99 = timings.recent("total", 50, 99)
-    counted = counters.snapshot()
+    p50, p99 = telemetry.timings.recent("total", 50, 99)
+    counted = telemetry.counts()
     lost = sum(sum(counted.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
     parts = [f"{rate_hz:5.1f} frames/s", f"delay {_waited_ms(actors):.0f} + {1e3 * p50:.1f} ms (p99 {1e3 * p99:.1f})"]
     for actor in actors:
@@ -29,13 +30,13 @@ def second_line(actors: Sequence[Actor], counters: Counters, timings: Timings, r
     return " | ".join([*parts, f"dropped {lost}"])
 
 
-def status(actors: Sequence[Actor], counters: Counters, timings: Timings, now_s: float) -> dict[str, Any]:
+def status(actors: Sequence[Actor], telemetry: Telemetry, now_s: float) -> dict[str, Any]:
     """Everything about a running server, as plain finite data."""
-    delays = dict(zip(("p50", "p99", "p99.9", "max"), timings.overall("total", 50, 99, 99.9, 100), strict=True))
+    delays_s = telemetry.timings.overall("total", *DELAY_PERCENTILES.values())
     return {
         "actors": {actor.config.name: _actor(actor, now_s) for actor in actors},
-        "delay_ms": {name: 1e3 * value for name, value in delays.items()},
-        "counters": counters.snapshot(),
+        "delay_ms": {name: 1e3 * s for name, s in zip(DELAY_PERCENTILES, delays_s, strict=True)},
+        "counters": telemetry.counts(),
     }
 
 

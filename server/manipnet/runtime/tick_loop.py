@@ -11,7 +11,7 @@ from manipnet.actors.hands_message import hands_message
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.synthesis.synthesizer import HandStep, Side, Synthesizer
-from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.telemetry import Telemetry
 from manipnet.tracking.outlier_gate import OutlierGate
 from manipnet.tracking.timeline import Tick
 from manipnet.wire import HandsMessage, Latency
@@ -45,19 +45,16 @@ class TickLoop:
         session: str,
         actors: Sequence[Actor],
         synthesizer: Synthesizer,
-        stages: StageClock,
         publish: Callable[[HandsMessage], object],
         mailbox: Mailbox,
         recorder: FlightRecorder,
-        counters: Counters,
-        timings: Timings,
+        telemetry: Telemetry,
         observer: TickObserver | None = None,
     ) -> None:
         self.actors = actors
         self._observer = observer
         self._session, self._publish, self._mailbox = session, publish, mailbox
-        self._recorder, self._counters, self._timings = recorder, counters, timings
-        self._synthesizer, self._stages = synthesizer, stages
+        self._recorder, self._telemetry, self._synthesizer = recorder, telemetry, synthesizer
         self._gate = OutlierGate()
         self._published_s: dict[str, float] = {}
 
@@ -80,11 +77,11 @@ class TickLoop:
             self._recorder.note(frame)
             frame, faults = self._gate.check(frame)
             for fault in faults:
-                self._counters.add("bodies_rejected", reason=fault)
+                self._telemetry.count("bodies_rejected", reason=fault)
             reasons = [self._push(actor, frame) for actor in self.actors]
             reason = min(reasons, key=_BEST_FIRST.index)
             if reason != _TAKEN:
-                self._counters.add("frames_dropped", reason=reason)
+                self._telemetry.count("frames_dropped", reason=reason)
             if reason == "unknown_body":
                 _log.warning("a frame of %s has no body of the rig: %s", frame.source, self._compare(frame))
 
@@ -115,7 +112,7 @@ class TickLoop:
             self._failed("input", error, [])
             return "internal"
         if actor.timeline.restarts > restarts:
-            self._counters.add("sender_restarts", source=frame.source.partition(":")[0])
+            self._telemetry.count("sender_restarts", source=frame.source.partition(":")[0])
         return reason or _TAKEN
 
     def _poll(self, actor: Actor, now_s: float) -> Tick | None:
@@ -123,9 +120,9 @@ class TickLoop:
         late, cut = timeline.skipped_late, timeline.skipped_at_restart
         tick = timeline.poll(now_s)
         if timeline.skipped_late > late:
-            self._counters.add("ticks_skipped", timeline.skipped_late - late, reason="backlog")
+            self._telemetry.count("ticks_skipped", timeline.skipped_late - late, reason="backlog")
         if timeline.skipped_at_restart > cut:
-            self._counters.add("ticks_skipped", timeline.skipped_at_restart - cut, reason="restart")
+            self._telemetry.count("ticks_skipped", timeline.skipped_at_restart - cut, reason="restart")
         return tick
 
     def _plan(self, actor: Actor, tick: Tick) -> Plan | None:
@@ -139,7 +136,7 @@ class TickLoop:
         """The steps of all hands as one batch, in the order of their plans; none at all when synthesis fails."""
         scenes = [scene for plan in plans for scene in plan.scenes.values()]
         memories = [memory for plan in plans for memory in plan.memories.values()]
-        self._stages.begin()
+        self._telemetry.stages.begin()
         try:
             return self._synthesizer.step(scenes, memories)
         except Exception as error:
@@ -160,10 +157,10 @@ class TickLoop:
 
     def _publish_hands(self, actor: Actor, tick: Tick, hands: dict[Side, ShownHand]) -> HandsMessage | None:
         for hand in hands.values():
-            self._counters.add("hand_ticks", state=hand.shown.state)
+            self._telemetry.count("hand_ticks", state=hand.shown.state)
         now_s = time.monotonic()
         waited_s, spent_s = tick.look_ahead_s, now_s - tick.waited_for_s
-        latency = Latency(buffer=1e3 * waited_s, total=1e3 * (waited_s + spent_s), **self._stages.last_ms)
+        latency = Latency(buffer=1e3 * waited_s, total=1e3 * (waited_s + spent_s), **self._telemetry.stages.last_ms)
         message = None
         try:
             message = hands_message(self._session, actor, tick, hands, now_s, latency)
@@ -175,16 +172,16 @@ class TickLoop:
 
     def _record(self, actor: Actor, started_s: float, waited_for_s: float) -> None:
         now_s = time.monotonic()
-        self._timings.record("encode", now_s - started_s)
-        self._timings.record("total", now_s - waited_for_s)
+        self._telemetry.timings.record("encode", now_s - started_s)
+        self._telemetry.timings.record("total", now_s - waited_for_s)
         before_s = self._published_s.get(actor.config.name)
         if before_s is not None:
-            self._timings.record("interval", now_s - before_s)
+            self._telemetry.timings.record("interval", now_s - before_s)
         self._published_s[actor.config.name] = now_s
 
     def _failed(self, stage: str, error: Exception, ticks: list[Tick]) -> None:
         """Count an internal error, leave what led to it in a file, and have all hands go on from what they show."""
-        self._counters.add("tick_errors", stage=stage)
+        self._telemetry.count("tick_errors", stage=stage)
         path = self._recorder.dump(error, ticks, time.monotonic())
         _log.error("%s failed: %s: %s%s", stage, type(error).__name__, error, f"; see {path}" if path else "")
         for actor in self.actors:

@@ -19,7 +19,7 @@ from manipnet.synthesis.model.layout import INPUT_SIZE
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import HandScene, Synthesizer, windows_of
-from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.telemetry import Telemetry
 from manipnet.wire import encode_binary, encode_msgpack
 from manipnet.wire.bodies import BodyFrame, BodySample
 
@@ -34,21 +34,18 @@ LOOK_AHEAD_S = 0.4
 def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
     """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
     for shape in shapes:
-        counters, timings = Counters(), Timings()
-        mailbox = Mailbox(counters)
-        actor = Actor(default_actor(), [Prop("prop", shape.name, shape)], bundle, counters, LOOK_AHEAD_S)
+        telemetry = Telemetry()
+        mailbox = Mailbox(telemetry)
+        actor = Actor(default_actor(), [Prop("prop", shape.name, shape)], bundle, telemetry, LOOK_AHEAD_S)
         actor.carry("prop", shape.name, shape, 1.0)
-        stages = StageClock(timings)
         loop = TickLoop(
             "warm-up",
             [actor],
-            Synthesizer(bundle, on_stage=stages.ended),
-            stages,
+            Synthesizer(bundle, on_stage=telemetry.stages.ended),
             lambda message: (encode_msgpack(message), encode_binary(message)),
             mailbox,
             FlightRecorder(Path(tempfile.gettempdir())),
-            counters,
-            timings,
+            telemetry,
         )
         start_s = time.monotonic()
         for i in range(FRAMES):

@@ -11,7 +11,7 @@ from fake_motive import FakeMotive
 
 from manipnet.control.service import Control
 from manipnet.net.curve_keys import make_client_keys, make_server_keys, read_server_keys
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.doctor import command as doctor
 from manipnet_tools.doctor import other_interfaces as elsewhere
@@ -148,7 +148,7 @@ def test_a_server_with_keys_is_asked_with_one(ports, capsys, monkeypatch, tmp_pa
     make_server_keys(tmp_path)
     path = make_client_keys(tmp_path, "stage-pc")
     handlers = {"status": lambda request: {"counters": {"frames_in": {"osc": 5}}, "actors": {}}}
-    control = Control("127.0.0.1", port(ports, "--control-port"), handlers, Counters(), read_server_keys(tmp_path))
+    control = Control("127.0.0.1", port(ports, "--control-port"), handlers, Telemetry(), read_server_keys(tmp_path))
     control.start()
     assert doctor.main([*ports, f"--key={path}"]) == 0
     control.stop()

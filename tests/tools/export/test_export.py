@@ -21,7 +21,7 @@ from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.synthesizer import hand_to_world
 from manipnet.wire import BodyPose, HandsMessage
 from manipnet_tools import cli
-from manipnet_tools.export.animation import ExportError, HandTrack, Performance, hand_track, read_performance
+from manipnet_tools.export.animation import ExportError, HandTrack, Animation, hand_track, read_performance
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf
@@ -49,7 +49,7 @@ def angles() -> dict[str, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def performance(angles: dict[str, np.ndarray]) -> Performance:
+def performance(angles: dict[str, np.ndarray]) -> Animation:
     """Two hands and two props, of which one has a mesh."""
     rng = np.random.default_rng(4)
     hands = {}
@@ -59,7 +59,7 @@ def performance(angles: dict[str, np.ndarray]) -> Performance:
     seen = np.arange(FRAMES) != 7
     objects = {name: BodyTrack(path_of(rng, 0.0), seen) for name in ("Box", "the cup")}
     meshes = {"Box": load_library_mesh("mug")}
-    return Performance("juggle", 60.0, 0.5 + np.arange(FRAMES) / 60, hands, objects, meshes)
+    return Animation("juggle", 60.0, 0.5 + np.arange(FRAMES) / 60, hands, objects, meshes)
 
 
 def turned_rad(a: np.ndarray, b: np.ndarray) -> float:
@@ -67,7 +67,7 @@ def turned_rad(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(quat_log(quat_multiply(quat_conjugate(a), b)), axis=-1).max())
 
 
-def test_bvh_comes_back_as_it_was(performance: Performance, tmp_path: Path) -> None:
+def test_bvh_comes_back_as_it_was(performance: Animation, tmp_path: Path) -> None:
     write_bvh(performance, tmp_path / "take")
     take = read_take(tmp_path / "take")
     assert (take.rate_hz, take.objects) == (60.0, ("Box", "the_cup"))
@@ -94,7 +94,7 @@ def test_a_captured_take_comes_back_as_it_was(manipnet_data: Path, tmp_path: Pat
     assert [word for word in ours.split() if word.isupper()] == [word for word in theirs.split() if word.isupper()]
 
 
-def test_bvh_for_others_is_right_handed_centimetres(performance: Performance, tmp_path: Path) -> None:
+def test_bvh_for_others_is_right_handed_centimetres(performance: Animation, tmp_path: Path) -> None:
     write_bvh(performance, tmp_path / "blender", right_handed=True)
     for side in SIDES:
         bvh = read_bvh(tmp_path / "blender" / f"{side}Hand.bvh")
@@ -157,7 +157,7 @@ class Gltf:
 
 
 @pytest.mark.parametrize("frame", [0, 17, FRAMES - 1])
-def test_gltf_skins_the_hands_as_we_do(performance: Performance, angles, tmp_path: Path, frame: int) -> None:
+def test_gltf_skins_the_hands_as_we_do(performance: Animation, angles, tmp_path: Path, frame: int) -> None:
     write_gltf(performance, tmp_path / "juggle.glb")
     gltf = Gltf(tmp_path / "juggle.glb")
     for side in SIDES:
@@ -173,7 +173,7 @@ def test_gltf_skins_the_hands_as_we_do(performance: Performance, angles, tmp_pat
     assert np.allclose(tips, performance.hands["right"].world()[0][frame, JOINT_NAMES.index("INDEX_TIP")], atol=1e-6)
 
 
-def test_gltf_faces_look_outward_and_time_starts_at_zero(performance: Performance, tmp_path: Path) -> None:
+def test_gltf_faces_look_outward_and_time_starts_at_zero(performance: Animation, tmp_path: Path) -> None:
     write_gltf(performance, tmp_path / "juggle.glb")
     gltf = Gltf(tmp_path / "juggle.glb")
     for mesh in gltf.json["meshes"]:
@@ -196,7 +196,7 @@ validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])), {uri: 
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])
-def test_the_khronos_validator_has_nothing_to_say(performance: Performance, tmp_path: Path, suffix: str) -> None:
+def test_the_khronos_validator_has_nothing_to_say(performance: Animation, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"juggle{suffix}"
     write_gltf(performance, path)
     report = run_node(VALIDATE, str(path), packages=("gltf-validator@2.0.0-dev.3.10",))
@@ -206,7 +206,7 @@ def test_the_khronos_validator_has_nothing_to_say(performance: Performance, tmp_
     assert report["info"]["animationCount"] == 1
 
 
-def test_a_stranger_reads_the_file(performance: Performance, tmp_path: Path) -> None:
+def test_a_stranger_reads_the_file(performance: Animation, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     write_gltf(performance, tmp_path / "juggle.glb")
     scene = trimesh.load_scene(tmp_path / "juggle.glb")
@@ -214,7 +214,7 @@ def test_a_stranger_reads_the_file(performance: Performance, tmp_path: Path) -> 
     assert len(scene.geometry["right_hand"].faces) == len(FACES)
 
 
-def test_csv_names_every_number(performance: Performance, angles, tmp_path: Path) -> None:
+def test_csv_names_every_number(performance: Animation, angles, tmp_path: Path) -> None:
     write_csv(performance, tmp_path / "juggle.csv")
     with (tmp_path / "juggle.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -232,10 +232,10 @@ def test_csv_names_every_number(performance: Performance, angles, tmp_path: Path
     assert [float(r["Box_tracked"]) for r in rows[6:9]] == [1.0, 0.0, 1.0]
 
 
-def test_a_hand_of_another_size_is_exported_at_its_size(performance: Performance, angles, tmp_path: Path) -> None:
+def test_a_hand_of_another_size_is_exported_at_its_size(performance: Animation, angles, tmp_path: Path) -> None:
     hand = performance.hands["right"]
     small = HandTrack(hand.wrist, hand.rotations, 0.9 * OFFSETS_M, hand.live)
-    write_gltf(Performance("small", 60.0, performance.time_s, {"right": small}), tmp_path / "small.glb")
+    write_gltf(Animation("small", 60.0, performance.time_s, {"right": small}), tmp_path / "small.glb")
     vertices = 0.9 * skin(*forward_kinematics(angles["right"][5]))
     assert np.allclose(
         Gltf(tmp_path / "small.glb").skinned("right_hand", 5), transform(hand.wrist[5], vertices), atol=2e-6

@@ -22,7 +22,7 @@ from manipnet.net.zap import secure_client
 from manipnet.net.zmq_socket import MAX_WIRE_BYTES
 from manipnet.recording.mcap_file import BODIES, HANDS, RecordingError, RecordingWriter, bodies_of, mesh_file
 from manipnet.synthesis.objects.mesh import load_mesh
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_MSGPACK, HandsMessage, decode_msgpack
 from manipnet.wire.bodies import MessageError
 from manipnet_tools.signals import stop_on_signals
@@ -110,7 +110,7 @@ def record_bodies(
     port: int, writer: RecordingWriter, going_on: Callable[[], bool], listening: Callable[[str], None]
 ) -> None:
     """Write every body frame sent to this machine's `port` while `going_on`; `listening` hears the address."""
-    receiver = ZmqBodies(lambda frame: writer.write_bodies(frame, time.time_ns()), Counters(), port=port)
+    receiver = ZmqBodies(lambda frame: writer.write_bodies(frame, time.time_ns()), Telemetry(), port=port)
     receiver.start()
     try:
         listening(receiver.address)

@@ -18,7 +18,7 @@ from manipnet.inputs.natnet.protocol import COMMAND_PORT
 from manipnet.inputs.osc.receiver import OscBodies
 from manipnet.inputs.zeromq import ZmqBodies
 from manipnet.net.errors import ListenError
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet_tools.commands.rig_guess import Listener, guess, rig_of
 
 EPILOG = """examples:
@@ -88,15 +88,15 @@ def init(options: argparse.Namespace) -> None:
 
 def _listen(options: argparse.Namespace) -> Listener:
     """Everything that arrives in the time given. Raises `ConfigError` where it cannot listen."""
-    listener, counters = Listener(), Counters()
+    listener, telemetry = Listener(), Telemetry()
     receivers: list[Any] = [
-        ZmqBodies(listener, counters, options.host, options.input_port),
-        OscBodies(listener, counters, options.host, options.osc_port),
+        ZmqBodies(listener, telemetry, options.host, options.input_port),
+        OscBodies(listener, telemetry, options.host, options.osc_port),
     ]
     if options.natnet is not None:
         host, port = parse_endpoint(options.natnet, COMMAND_PORT)
         kind = {"multicast": options.multicast, "interface": options.interface}
-        receivers.append(NatNetBodies(listener, counters, host, port, **kind))
+        receivers.append(NatNetBodies(listener, telemetry, host, port, **kind))
     logging.getLogger("manipnet.inputs").setLevel(logging.ERROR)
     with ExitStack() as opened:
         for receiver in receivers:

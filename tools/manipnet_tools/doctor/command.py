@@ -31,7 +31,7 @@ from manipnet.inputs.zeromq import ZmqBodies
 from manipnet.net.curve_keys import KeyFileError, read_client_keys
 from manipnet.net.errors import ListenError
 from manipnet.net.zap import secure_client
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.doctor import from_status as self_report
 from manipnet_tools.doctor import other_interfaces as elsewhere
@@ -96,11 +96,11 @@ def examine(options: argparse.Namespace) -> list[Finding]:
     running = ask_status(options.host, options.control_port, options.key)
     if running is not None:
         return self_report.of_server(running, f"{options.host}:{options.control_port}")
-    listener, counters = Listener(), Counters()
+    listener, telemetry = Listener(), Telemetry()
     log = logging.getLogger("manipnet.inputs")
     findings: list[Finding] = []
     addresses: dict[str, str] = {}
-    receivers, motive = _receivers(options, listener, counters)
+    receivers, motive = _receivers(options, listener, telemetry)
     with ExitStack() as opened:
         log.addHandler(listener)
         opened.callback(log.removeHandler, listener)
@@ -119,22 +119,22 @@ def examine(options: argparse.Namespace) -> list[Finding]:
         findings += _elsewhere(options.host, beside.heard())
         if motive is not None:
             findings += self_report.of_motive(motive.status())
-    heard = Heard(listener.sources, counters.snapshot().get("frames_dropped", {}), listener.complaints)
+    heard = Heard(listener.sources, telemetry.counts().get("frames_dropped", {}), listener.complaints)
     return findings + diagnose(heard, expected_parts(actors), addresses)
 
 
 def _receivers(
-    options: argparse.Namespace, listener: Listener, counters: Counters
+    options: argparse.Namespace, listener: Listener, telemetry: Telemetry
 ) -> tuple[dict[str, Any], NatNetBodies | None]:
     """Everything that would receive bodies in the server, and the one of NatNet if it is asked for."""
     receivers: dict[str, Any] = {
-        "bodies": ZmqBodies(listener, counters, options.host, options.input_port),
-        "osc": OscBodies(listener, counters, options.host, options.osc_port),
+        "bodies": ZmqBodies(listener, telemetry, options.host, options.input_port),
+        "osc": OscBodies(listener, telemetry, options.host, options.osc_port),
     }
     if options.natnet is None:
         return receivers, None
     host, port = parse_endpoint(options.natnet, COMMAND_PORT)
-    motive = NatNetBodies(listener, counters, host, port, multicast=options.multicast, interface=options.interface)
+    motive = NatNetBodies(listener, telemetry, host, port, multicast=options.multicast, interface=options.interface)
     return {**receivers, "natnet": motive}, motive
 
 

@@ -30,7 +30,7 @@ def halve_weights(content: bytes) -> bytes:
             continue
         name = tensor.name
         tensor.CopyFrom(numpy_helper.from_array(values.astype(np.float16), f"{name}_half"))
-        casts.append(helper.make_node("ActorsProxy", [f"{name}_half"], [name], to=TensorProto.FLOAT))
+        casts.append(helper.make_node("Cast", [f"{name}_half"], [name], to=TensorProto.FLOAT))
     nodes = [*casts, *model.graph.node]
     del model.graph.node[:]
     model.graph.node.extend(nodes)
@@ -44,7 +44,7 @@ def single_precision(content: bytes) -> bytes:
     stored = {tensor.name: tensor for tensor in model.graph.initializer}
     nodes = []
     for node in model.graph.node:
-        if node.op_type == "ActorsProxy" and node.input[0] in stored:
+        if node.op_type == "Cast" and node.input[0] in stored:
             values = numpy_helper.to_array(stored[node.input[0]]).astype(np.float32)
             stored[node.input[0]].CopyFrom(numpy_helper.from_array(values, node.output[0]))
         else:

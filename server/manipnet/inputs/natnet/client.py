@@ -25,7 +25,7 @@ from manipnet.net.clock_offset import ClockProbes
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.udp import Address, UdpThread, bind_udp, join_multicast, local_address_towards
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, make_sample
 
 KNOCK_S = 1.0
@@ -55,7 +55,7 @@ class NatNetBodies:
     def __init__(
         self,
         sink: Sink,
-        counters: Counters,
+        telemetry: Telemetry,
         host: str,
         port: int = COMMAND_PORT,
         *,
@@ -64,7 +64,7 @@ class NatNetBodies:
         up: UpAxis = "y",
         allow: Sequence[Network] = (),
     ) -> None:
-        self._intake = Intake("natnet", sink, counters)
+        self._intake = Intake("natnet", sink, telemetry)
         self._guard, self._allowed = SourceRateLimiter(), AllowList(allow)
         self._host, self._port = host, port
         self._multicast, self._interface, self._up = multicast, interface, up

@@ -9,7 +9,7 @@ from manipnet.net.addresses import AllowList, Network
 from manipnet.net.flood_filter import FloodFilter, FloodWatch
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.udp import Address, UdpThread, bind_udp
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, MessageError
 
 MAX_SENDERS = 16
@@ -28,12 +28,12 @@ class OscBodies:
     def __init__(
         self,
         sink: Sink,
-        counters: Counters,
+        telemetry: Telemetry,
         host: str = "127.0.0.1",
         port: int = 39540,
         allow: Sequence[Network] | None = None,
     ) -> None:
-        self._intake = Intake("osc", sink, counters)
+        self._intake = Intake("osc", sink, telemetry)
         self._guard = SourceRateLimiter(DATAGRAMS_PER_S)
         self._allowed = AllowList(allow)
         self._host, self._port = host, port
