@@ -19,9 +19,9 @@ class RequestError(Exception):
 class ControlClient:
     """Sends requests to the control port of `manipnet-serve` at `address`, one connection for each.
 
-    `keys` names the file that `manipnet keys make NAME` wrote, for a server that requires one; it needs pyzmq. A request
-    that has no reply after `timeout_s` fails. All methods may be called from any thread. Raises `ValueError` for a wrong
-    address or a wrong file of keys.
+    `keys` names the file that `manipnet keys make NAME` wrote, for a server that requires keys; it needs pyzmq. A
+    request without a reply after `timeout_s` fails. Any thread may call `ask`. Raises `ValueError` for a wrong address
+    or a wrong file of keys.
     """
 
     def __init__(

@@ -25,7 +25,7 @@ SLICE_MS = 50
 HIGH_WATER_MARK = 64
 FAILURES = {
     zmq.Event.HANDSHAKE_FAILED_AUTH: "the server does not list this client's key (in its clients.allow)",
-    zmq.Event.HANDSHAKE_FAILED_PROTOCOL: "the server does not use CURVE, or its key is not the one in this client's file",
+    zmq.Event.HANDSHAKE_FAILED_PROTOCOL: "the server does not use CURVE, or its key is not the one in this file",
     zmq.Event.HANDSHAKE_FAILED_NO_DETAIL: "the server refused this client; check that its key is the one in this file",
     zmq.Event.DISCONNECTED: "the server closed the connection",
     zmq.Event.CLOSED: "no server answers",

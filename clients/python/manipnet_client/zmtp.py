@@ -68,7 +68,7 @@ class Connection:
             self._socket.sendall(bytes([flags | LONG]) + len(body).to_bytes(8, "big") + body)
 
     def receive(self, timeout_s: float) -> None:
-        """Wait for more bytes; raises `TimeoutError` when none arrive in time and `OSError` when the connection ends."""
+        """Wait for more bytes; raises `TimeoutError` when none arrive in time, `OSError` when the connection ends."""
         self._socket.settimeout(max(timeout_s, 1e-3))
         data = self._socket.recv(RECEIVE_BYTES)
         if not data:
