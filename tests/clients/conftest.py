@@ -1,4 +1,4 @@
-"""The harnesses of the clients in other languages."""
+"""Builds the harnesses of the clients in other languages."""
 
 import functools
 
@@ -8,5 +8,5 @@ from languages import build
 
 @pytest.fixture(scope="session")
 def harness(tmp_path_factory):
-    """By name, the command of a language's client; each is built once."""
+    """Returns the command of a client's harness by name and builds each harness once."""
     return functools.cache(lambda name: build(name, tmp_path_factory.mktemp(name)))
