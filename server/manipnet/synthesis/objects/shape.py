@@ -22,6 +22,7 @@ from manipnet.synthesis.objects.distance_field import (
     build_field,
     signed_distance,
 )
+from manipnet.synthesis.objects.library import library_file
 from manipnet.synthesis.objects.mesh import ClosedMesh, load_mesh
 from manipnet.synthesis.objects.rays import RayScene, ray_scene
 from manipnet.synthesis.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES, simplified
@@ -120,9 +121,14 @@ def _signed_distances(bvh, field, points, exact_within_m, distance, normal):
         distance[i], normal[i, 0], normal[i, 1], normal[i, 2] = d, x, y, z
 
 
-def load_shape(path: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> Shape:
-    """Read a mesh file and build its shape. Raises `MeshError` as `load_mesh` does."""
-    return build_shape(load_mesh(path, unit, scale, name))
+def load_shape(mesh: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> Shape:
+    """Build the shape of a mesh file in `unit`, or of the library object of that name.
+
+    Raises `MeshError` as `load_mesh` does.
+    """
+    if not Path(mesh).is_file() and (file := library_file(str(mesh))) is not None:
+        mesh, unit = file, "m"
+    return build_shape(load_mesh(mesh, unit, scale, name))
 
 
 def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
