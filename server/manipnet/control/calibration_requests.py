@@ -12,8 +12,9 @@ from manipnet.actors import calibration
 from manipnet.actors.actor import SIDES, Actor
 from manipnet.actors.calibration import CalibrationError, Steady, steady_pose
 from manipnet.actors.transitions import HOLD_AFTER_S
+from manipnet.common.options import ConfigError
 from manipnet.config.rig_writer import store
-from manipnet.config.settings import WRISTS, ConfigError
+from manipnet.config.settings import WRISTS
 from manipnet.control.actors_proxy import ActorsProxy, body_key
 from manipnet.control.request import Handler, Request, RequestError, choice, number
 from manipnet.control.session_requests import placement

@@ -17,8 +17,9 @@ from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
 from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
 from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.objects.mesh import UNITS_M, MeshError
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.objects.mesh import MeshError
+from manipnet.synthesis.objects.units import UNITS_M
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import TICK_HZ
 from manipnet.wire import VERSION

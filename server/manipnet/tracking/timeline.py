@@ -16,7 +16,8 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array, compose
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S, PRESENT, WINDOW_OFFSETS_S
+from manipnet.synthesis.model.layout import PRESENT, WINDOW_OFFSETS_S
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.tracking.forecast import damped_velocity
 from manipnet.tracking.pose_buffer import TIME_TOLERANCE_S, Forecast, PoseBuffer, sample
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from manipnet.actors.props import Prop, choose_prop
 from manipnet.geometry import Array
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene, HandStep, Side, Synthesizer
 from manipnet.tracking.timeline import BodyAtTick, Tick, Timeline
