@@ -22,6 +22,7 @@ from manipnet.control.service import Control
 from manipnet.control.session_requests import Requests
 from manipnet.inputs.natnet.client import NatNetBodies
 from manipnet.inputs.osc.receiver import OscBodies
+from manipnet.inputs.sender_stats import SenderStats
 from manipnet.inputs.zeromq import ZmqBodies
 from manipnet.net.curve_keys import read_server_keys
 from manipnet.net.errors import ListenError
@@ -80,7 +81,8 @@ class Server:
         self.telemetry = Telemetry()
         self._mailbox, self._watch = Mailbox(self.telemetry), SilenceWatch()
         self._catalog = ObjectCatalog(config.objects, config.objects_unit)
-        self._around = Peers(self._mailbox.put)
+        self._senders = SenderStats(self._mailbox.put)
+        self._around = Peers(self._senders)
         self.telemetry.add_gauges(self._around.gauges)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model, config.provider)
@@ -190,15 +192,15 @@ class Server:
 
     def _zmq_bodies(self) -> ZmqBodies:
         config = self._config
-        return ZmqBodies(self._around.sink, self.telemetry, config.host, config.input_port, self._keys)
+        return ZmqBodies(self._senders, self.telemetry, config.host, config.input_port, self._keys)
 
     def _osc_bodies(self) -> OscBodies:
         config = self._config
-        return OscBodies(self._around.sink, self.telemetry, config.host, config.osc_port, config.allow or None)
+        return OscBodies(self._senders, self.telemetry, config.host, config.osc_port, config.allow or None)
 
     def _motive(self, host: str, port: int) -> NatNetBodies:
         return NatNetBodies(
-            self._around.sink,
+            self._senders,
             self.telemetry,
             host,
             port,
