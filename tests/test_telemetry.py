@@ -15,7 +15,7 @@ from manipnet.runtime.console import Console
 from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.runtime.status import SilenceWatch
 from manipnet.telemetry import DROP_REASONS, LABELS, RepeatFilter, Telemetry, Timings
-from manipnet.tracking.timeline import BodyHealth
+from manipnet.tracking.tick import BodyHealth
 from manipnet.wire.bodies import BodyFrame
 
 SOURCES = sorted((Path(__file__).parents[1] / "server").rglob("*.py"))

@@ -22,6 +22,7 @@ from manipnet.control.request import Handler
 from manipnet.control.service import Control
 from manipnet.control.session_requests import Requests
 from manipnet.inputs import make_receivers, start_receivers
+from manipnet.inputs.sender_stats import SenderStats
 from manipnet.net.curve_keys import read_server_keys
 from manipnet.outputs import open_outputs
 from manipnet.outputs.declaration import Emission
@@ -70,7 +71,8 @@ class Server:
         self.telemetry = Telemetry()
         self._mailbox, self._watch = Mailbox(self.telemetry), SilenceWatch()
         self._catalog = ObjectCatalog(config.objects, config.objects_unit)
-        self._around = Peers(self._mailbox.put)
+        self._senders = SenderStats(self._mailbox.put)
+        self._around = Peers(self._senders)
         self.telemetry.add_gauges(self._around.gauges)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model, config.provider)
@@ -119,7 +121,7 @@ class Server:
         page = LivePage(page_host, config.page_port, control.answer, telemetry)
         opened.callback(page.stop)
         page.start()
-        receivers = make_receivers(config.of, self._around.sink, telemetry, config.host, self._keys, config.allow)
+        receivers = make_receivers(config.of, self._senders, telemetry, config.host, self._keys, config.allow)
         start_receivers(receivers, opened)
         self._around.receivers = {declared.title: receiver for declared, receiver in receivers.items()}
         self._around.connected = lambda: {**publisher.connected(), "control": control.connected()}

@@ -17,7 +17,7 @@ from manipnet.inputs.playback import OscBodySender, PlayError, looped, play
 from manipnet.inputs.zeromq import ZEROMQ
 from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_S
+from manipnet.tracking.tick import TICK_S
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError
 from manipnet_tools import cli
 from manipnet_tools.commands import replay

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 from manipnet.control.request import Handler, Request, RequestError, number
-from manipnet.inputs.base import Sink
 from manipnet.inputs.declaration import Receiver
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.telemetry import Gauge
@@ -17,10 +16,10 @@ MAX_OFFSET_S: Final = 1e10
 
 
 class Peers:
-    """Knows the sockets of one server. Its `sink` is where the receivers leave frames. From any thread."""
+    """Knows the sockets of one server. From any thread."""
 
-    def __init__(self, sink: Sink) -> None:
-        self.sink = SenderStats(sink)
+    def __init__(self, senders: SenderStats) -> None:
+        self._senders = senders
         self.receivers: Mapping[str, Receiver] = {}
         """The receivers by their names in `status`."""
         self.connected: Callable[[], Mapping[str, int]] = dict
@@ -59,7 +58,7 @@ class Peers:
 
     def _report(self) -> dict[str, Any]:
         now_s = time.monotonic()
-        report: dict[str, Any] = {"senders": self.sink.report(now_s), "connections": self._connections()}
+        report: dict[str, Any] = {"senders": self._senders.report(now_s), "connections": self._connections()}
         with self._lock:
             report["clocks"] = {
                 name: {"clock_offset_s": offset_s, "clock_uncertainty_s": uncertainty_s, "age_s": now_s - at_s}

@@ -21,7 +21,7 @@ from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import MeshError
 from manipnet.synthesis.objects.units import UNITS_M
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_HZ
+from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import VERSION
 
 MAX_PATH: Final = 1024
@@ -131,7 +131,7 @@ class Requests:
 
         def change() -> None:
             for actor in self._actors:
-                actor.timeline.look_ahead_s = seconds
+                actor.look_ahead_s = seconds
 
         self._proxy.ask(change)
         return {"seconds": seconds}
@@ -149,7 +149,7 @@ class Requests:
 
         def change() -> None:
             for actor in actors:
-                actor.paused = on
+                actor.pause(on)
 
         self._proxy.ask(change)
         return {"actors": [actor.config.name for actor in actors], "paused": on}
