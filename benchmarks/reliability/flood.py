@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from live_server import serving
 
-from manipnet.tracking.timeline import TICK_HZ
+from manipnet.tracking.tick import TICK_HZ
 
 from .live import Watched, osc_sender, playing, watching
 from .motion import frames, motion

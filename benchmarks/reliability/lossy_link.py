@@ -16,7 +16,7 @@ import numpy as np
 from live_server import LiveServer, serving
 from simulated_link import Proxy, UdpProxy, Weather, ZmqProxy
 
-from manipnet.tracking.timeline import TICK_HZ
+from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import HandsMessage
 from manipnet_tools.bench.scenarios import Performance
 

@@ -6,25 +6,26 @@ import secrets
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from platformdirs import user_log_path
 
 from manipnet import __version__
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
-from manipnet.config.settings import ActorConfig, ConfigError, ServerConfig, check
+from manipnet.common.options import ConfigError
+from manipnet.config.settings import ActorConfig, ServerConfig, check
 from manipnet.control.actors_proxy import ActorsProxy
 from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.peers import Peers
 from manipnet.control.request import Handler
 from manipnet.control.service import Control
 from manipnet.control.session_requests import Requests
-from manipnet.inputs.natnet.client import NatNetBodies
-from manipnet.inputs.osc.receiver import OscBodies
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs import make_receivers, start_receivers
+from manipnet.inputs.sender_stats import SenderStats
 from manipnet.net.curve_keys import read_server_keys
-from manipnet.net.errors import ListenError
+from manipnet.outputs import open_outputs
+from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
 from manipnet.page.supervisor import LivePage
 from manipnet.recording.recorder import Recorder, carried
@@ -53,16 +54,6 @@ WARM_UP_SHAPE = "cube"
 _log = logging.getLogger(__name__)
 
 
-class Receiver(Protocol):
-    """Whatever delivers bodies: listens from `start`, which raises `ListenError`, until `stop`."""
-
-    address: str
-
-    def start(self) -> None: ...
-
-    def stop(self) -> None: ...
-
-
 class Server:
     """One server. `say` shows a line to a person and must return at once."""
 
@@ -80,11 +71,12 @@ class Server:
         self.telemetry = Telemetry()
         self._mailbox, self._watch = Mailbox(self.telemetry), SilenceWatch()
         self._catalog = ObjectCatalog(config.objects, config.objects_unit)
-        self._around = Peers(self._mailbox.put)
+        self._senders = SenderStats(self._mailbox.put)
+        self._around = Peers(self._senders)
         self.telemetry.add_gauges(self._around.gauges)
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._bundle = load_bundle(config.model, config.provider)
-        pose_a_hand(self._bundle)
+        pose_a_hand(self._bundle, config.solver)
         compiled_aside()
         self._actors = [self._actor(actor) for actor in config.actors]
         self._shown = 0
@@ -96,7 +88,7 @@ class Server:
         Raises `ListenError` for an address that is taken, and `ConfigError` for a receiver nobody knows.
         """
         shapes = self._catalog.shapes() or [self._catalog.shape(WARM_UP_SHAPE)]
-        warm_up(self._bundle, shapes)
+        warm_up(self._bundle, shapes, self._config.solver)
         with ExitStack() as opened:
             loop, addresses = self._open(opened)
             sys.setswitchinterval(SWITCH_INTERVAL_S)
@@ -114,7 +106,8 @@ class Server:
         actors_proxy = ActorsProxy(self._actors, self._mailbox)
         recorder = Recorder(config.takes, lambda: self._about(actors_proxy), telemetry)
         opened.callback(recorder.stop)
-        publisher = Publisher(config, telemetry, self._keys, recorder.note)
+        outputs = open_outputs(config.of, Emission(telemetry, config.host, self._keys))
+        publisher = Publisher(outputs, telemetry, recorder.note)
         opened.callback(publisher.close)
         meshes = MeshWatch(self._catalog, lambda old, new: actors_proxy.ask(lambda: self._reshape(old, new)))
         opened.callback(meshes.stop)
@@ -128,23 +121,13 @@ class Server:
         page = LivePage(page_host, config.page_port, control.answer, telemetry)
         opened.callback(page.stop)
         page.start()
-        bodies = self._zmq_bodies()
-        self._around.connected = lambda: {
-            **publisher.connected(),
-            "bodies": bodies.connected(),
-            "control": control.connected(),
-        }
-        addresses = {
-            "hands": publisher.addresses["hands"],
-            "bodies": self._listen(opened, "--input-port", bodies),
-            "control": control.address,
-            "osc": self._listen(opened, "--osc-port", self._osc_bodies()),
-            "page": page.address,
-            "web": publisher.addresses["web"],
-        }
-        if config.natnet is not None:
-            self._around.motive = self._motive(*config.natnet)
-            addresses["natnet"] = self._listen(opened, "--natnet", self._around.motive)
+        receivers = make_receivers(config.of, self._senders, telemetry, config.host, self._keys, config.allow)
+        start_receivers(receivers, opened)
+        self._around.receivers = {declared.title: receiver for declared, receiver in receivers.items()}
+        self._around.connected = lambda: {**publisher.connected(), "control": control.connected()}
+        addresses = publisher.addresses
+        addresses |= {declared.title: receiver.address for declared, receiver in receivers.items()}
+        addresses |= {"control": control.address, "page": page.address}
         if config.metrics_port is not None:
             metrics = MetricsPage(LOOPBACK, config.metrics_port, telemetry)
             opened.callback(metrics.close)
@@ -155,7 +138,7 @@ class Server:
         return TickLoop(
             self.session,
             self._actors,
-            Synthesizer(self._bundle, on_stage=self.telemetry.stages.ended),
+            Synthesizer(self._bundle, self._config.solver, self.telemetry.stages.ended),
             publisher.publish,
             self._mailbox,
             FlightRecorder(self._config.dump_dir or user_log_path("manipnet", appauthor=False)),
@@ -188,26 +171,6 @@ class Server:
             about |= {"rig": rig.read_text(encoding="utf-8-sig")} if rig else {}
         return about, props
 
-    def _zmq_bodies(self) -> ZmqBodies:
-        config = self._config
-        return ZmqBodies(self._around.sink, self.telemetry, config.host, config.input_port, self._keys)
-
-    def _osc_bodies(self) -> OscBodies:
-        config = self._config
-        return OscBodies(self._around.sink, self.telemetry, config.host, config.osc_port, config.allow or None)
-
-    def _motive(self, host: str, port: int) -> NatNetBodies:
-        return NatNetBodies(
-            self._around.sink,
-            self.telemetry,
-            host,
-            port,
-            multicast=self._config.multicast,
-            interface=self._config.interface,
-            up=self._config.up,
-            allow=self._config.allow,
-        )
-
     def _make_demo(self) -> "Demo":
         from manipnet.demo.player import Demo  # its libraries are of no use to a live session
 
@@ -218,14 +181,6 @@ class Server:
     def _actor(self, config: ActorConfig) -> Actor:
         props = [self._catalog.load(thing) for thing in config.objects]
         return Actor(config, props, self._bundle, self.telemetry, self._config.look_ahead_s)
-
-    def _listen(self, opened: ExitStack, option: str, receiver: Receiver) -> str:
-        try:
-            receiver.start()
-        except ListenError as error:
-            raise ListenError(f"{option}: {error}") from None
-        opened.callback(receiver.stop)
-        return receiver.address
 
     def _every_second(self, now_s: float) -> None:
         shown = sum(actor.seq for actor in self._actors)

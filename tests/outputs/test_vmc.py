@@ -11,7 +11,8 @@ from make_vectors import messages
 from pythonosc.osc_bundle import OscBundle
 
 from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
-from manipnet.outputs import vmc
+from manipnet.outputs.declaration import EncodedHands
+from manipnet.outputs.vmc import sender as vmc
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.skeleton import PARENTS
 from manipnet.wire import HandPose
@@ -110,7 +111,7 @@ def test_read_by_an_independent_osc_tool():
     try:
         text, give_up = b"", time.monotonic() + 20
         while text.count(b"/VMC/Ext/Bone/Pos") < 32 and time.monotonic() < give_up:
-            sender.send(message)  # again and again: the tool does not tell when it listens
+            sender.send(EncodedHands(message, b"", b""))  # again and again: the tool does not tell when it listens
             while select.select([process.stdout], [], [], 0.05)[0]:
                 text += process.stdout.read1(65536)
     finally:

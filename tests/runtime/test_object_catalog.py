@@ -178,7 +178,7 @@ class Scene:
         t_s = self._frames / 60
         self._frames += 1
         self.actor.push(BodyFrame(t_s, None, bodies, t_s, "zmq:test"))
-        tick = self.actor.timeline.poll(t_s)
+        tick = self.actor.poll(t_s)
         assert tick is not None
         return self.actor.plan(tick)
 

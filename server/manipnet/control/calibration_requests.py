@@ -9,16 +9,17 @@ from typing import Any, Final
 import numpy as np
 
 from manipnet.actors import calibration
-from manipnet.actors.actor import SIDES, Actor
+from manipnet.actors.actor import Actor
 from manipnet.actors.calibration import CalibrationError, Steady, steady_pose
 from manipnet.actors.transitions import HOLD_AFTER_S
+from manipnet.common.options import ConfigError
 from manipnet.config.rig_writer import store
-from manipnet.config.settings import WRISTS, ConfigError
+from manipnet.config.settings import WRISTS
 from manipnet.control.actors_proxy import ActorsProxy, body_key
 from manipnet.control.request import Handler, Request, RequestError, choice, number
 from manipnet.control.session_requests import placement
 from manipnet.geometry import Array, compose, invert, quat_normalize
-from manipnet.synthesis.synthesizer import Side
+from manipnet.wire import SIDES, Side
 
 SECONDS: Final = 2.0
 SECONDS_RANGE: Final = (0.5, 4.0)
@@ -107,7 +108,7 @@ class CalibrationRequests:
     def _place_object(self, request: Request) -> dict[str, Any]:
         actor = self._proxy.actor(request)
         body = body_key(request)
-        part = self._proxy.ask(lambda: actor.part(body))
+        part = self._proxy.ask(lambda: actor.role(body))
         props = {prop.name: prop for prop in actor.props}
         if part not in props:
             allowed = ", ".join(props) or "none: select_object gives a body something to carry"

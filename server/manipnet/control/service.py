@@ -10,12 +10,12 @@ from typing import Final
 import msgpack
 import zmq
 
-from manipnet.config.settings import is_loopback
 from manipnet.control.request import Handler, Request, RequestError, _show
-from manipnet.net.access_control import AccessControl
+from manipnet.net.addresses import is_loopback
 from manipnet.net.curve_keys import ServerKeys
+from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import Throttle
-from manipnet.net.zmq_socket import bind, zmq_endpoint
+from manipnet.net.zmq_socket import BoundSocket
 from manipnet.telemetry import CONTROL_OPS, Telemetry
 
 MAX_REQUEST_BYTES: Final = 4096
@@ -41,25 +41,11 @@ class Control:
     ) -> None:
         """Binds; raises `ListenError`. `start` begins to answer. With `keys` only clients on their list may ask."""
         self._handlers, self._telemetry, self._throttle = handlers, telemetry, Throttle(REQUESTS_PER_S, BURST)
-        endpoint, ipv6 = zmq_endpoint(host, port)
-        self._context = zmq.Context()
-        rep = self._context.socket(zmq.REP)
-        rep.setsockopt(zmq.LINGER, 0)
-        rep.setsockopt(zmq.MAXMSGSIZE, MAX_REQUEST_BYTES)
-        rep.setsockopt(zmq.SNDHWM, 16)
-        rep.setsockopt(zmq.RCVHWM, 16)
-        rep.setsockopt(zmq.HEARTBEAT_IVL, 1_000)
-        rep.setsockopt(zmq.HEARTBEAT_TIMEOUT, 3_000)
-        rep.setsockopt(zmq.IPV6, int(ipv6))
         try:
-            self._access = AccessControl(self._context, rep, telemetry, keys)
-            bind(rep, endpoint, "--control-port")
-        except BaseException:
-            rep.close()
-            self._context.term()
-            raise
-        self.address = rep.getsockopt_string(zmq.LAST_ENDPOINT)
-        self._socket = rep
+            self._bound = BoundSocket(zmq.REP, host, port, telemetry, keys, MAX_REQUEST_BYTES)
+        except ListenError as error:
+            raise ListenError(f"--control-port: {error}") from None
+        self.address = self._bound.address
         self._thread = threading.Thread(target=self._run, name="control", daemon=True)
 
     def start(self) -> None:
@@ -68,22 +54,22 @@ class Control:
 
     def stop(self) -> None:
         """Stop answering and free the port."""
-        if not self._thread.is_alive():
-            self._socket.close()
-        self._context.term()  # wakes the thread, and waits until it closed its socket
         if self._thread.is_alive():
+            self._bound.interrupt()
             self._thread.join()
+        else:
+            self._bound.close()
 
     def connected(self) -> int:
         """How many clients there are at present. From any thread."""
-        return len(self._access.connections)
+        return self._bound.connected()
 
     def _run(self) -> None:
-        with self._socket as rep:
+        with self._bound.socket as rep:
             while True:
                 try:
                     frames = rep.recv_multipart(copy=False)
-                    self._access.connections.delivered(frames[0].get(zmq.SRCFD))
+                    self._bound.delivered(frames[0])
                     time.sleep(self._throttle.delay_s(time.monotonic()))
                     here = is_loopback(str(frames[0].get("Peer-Address")))
                     rep.send(self.answer([frame.bytes for frame in frames], here))

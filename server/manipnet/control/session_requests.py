@@ -17,10 +17,11 @@ from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
 from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
 from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.objects.mesh import UNITS_M, MeshError
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.objects.mesh import MeshError
+from manipnet.synthesis.objects.units import UNITS_M
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_HZ
+from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import VERSION
 
 MAX_PATH: Final = 1024
@@ -130,7 +131,7 @@ class Requests:
 
         def change() -> None:
             for actor in self._actors:
-                actor.timeline.look_ahead_s = seconds
+                actor.look_ahead_s = seconds
 
         self._proxy.ask(change)
         return {"seconds": seconds}
@@ -148,7 +149,7 @@ class Requests:
 
         def change() -> None:
             for actor in actors:
-                actor.paused = on
+                actor.pause(on)
 
         self._proxy.ask(change)
         return {"actors": [actor.config.name for actor in actors], "paused": on}

@@ -16,7 +16,8 @@ from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, Final
 
-from manipnet.actors.actor import Actor, Plan
+from manipnet.actors.actor import Actor
+from manipnet.actors.plan import Plan
 from manipnet.actors.props import Prop
 from manipnet.geometry import Array
 from manipnet.net.errors import ListenError
@@ -25,7 +26,7 @@ from manipnet.page.serialization import pack, unpack
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandStep, Side
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import Tick
+from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
 
 FRAMES_HZ: Final = 30.0
@@ -61,11 +62,9 @@ class LivePage:
         """Begin to serve."""
         self._thread.start()
 
-    def see(
-        self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
-    ) -> None:
+    def see(self, actor: Actor, plan: Plan, message: HandsMessage) -> None:
         """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
-        frame = frame_of(actor, tick, steps, message)
+        frame = frame_of(actor, plan.tick, plan.steps, message)
         with self._news:
             if message.actor in self._newest:
                 self._telemetry.count("page_frames", fate="skipped")

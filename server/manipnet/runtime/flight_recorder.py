@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from manipnet.tracking.timeline import Tick
+from manipnet.tracking.tick import Tick
 from manipnet.wire.bodies import BodyFrame
 
 KEEP_FRAMES: Final = 360
@@ -36,7 +36,7 @@ class FlightRecorder:
         """Remember a frame."""
         self._frames.append(frame)
 
-    def dump(self, error: BaseException, ticks: list[Tick], now_s: float) -> Path | None:
+    def dump(self, error: BaseException, ticks: Sequence[Tick], now_s: float) -> Path | None:
         """Have frames, ticks and the error written as JSON; None when that was done moments ago.
 
         A thread does it that the program's end waits for.

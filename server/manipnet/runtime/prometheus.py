@@ -7,7 +7,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 
 from manipnet.net.errors import ListenError
-from manipnet.telemetry import LABELS, STAGES, Telemetry
+from manipnet.telemetry import STAGES, Telemetry
 
 QUANTILES = (50.0, 99.0, 99.9, 100.0)
 
@@ -39,7 +39,7 @@ class _Figures(Collector):
 
     def collect(self) -> Iterator[Metric]:
         counted = self._telemetry.counts()
-        for name, (label, values) in LABELS.items():
+        for name, (label, values) in self._telemetry.labels().items():
             family = CounterMetricFamily(f"manipnet_{name}", name.replace("_", " "), labels=[label])
             for value in values:
                 family.add_metric([value], counted.get(name, {}).get(value, 0))

@@ -8,7 +8,7 @@ from typing import Any, Final
 from manipnet.actors.actor import Actor
 from manipnet.actors.transitions import state_at_age
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import BodyHealth
+from manipnet.tracking.tick import BodyHealth
 
 WARN_AFTER_S: Final = 3.0
 ERROR_AFTER_S: Final = 10.0
@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 
 def second_line(actors: Sequence[Actor], telemetry: Telemetry, rate_hz: float) -> str:
     """One second of a server in one line: rate, delay, both hands of each actor, what was lost."""
-    if not any(actor.timeline.running for actor in actors):
+    if not any(actor.receiving for actor in actors):
         return "waiting for bodies: nothing of the rig has arrived yet (`manipnet doctor` says why)"
     p50, p99 = telemetry.timings.recent("total", 50, 99)
     counted = telemetry.counts()
@@ -67,7 +67,6 @@ class SilenceWatch:
 
 
 def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
-    timeline = actor.timeline
     hands = {
         side: {"state": hand.shown.state if hand.shown else "rest", "object": hand.prop}
         for side, hand in actor.hands.items()
@@ -82,12 +81,12 @@ def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
     }
     return {
         "seq": actor.seq,
-        "look_ahead_s": timeline.look_ahead_s,
+        "look_ahead_s": actor.look_ahead_s,
         "paused": actor.paused,
         "hands": hands,
         "bodies": bodies,
-        "ticks_skipped": timeline.skipped_late + timeline.skipped_at_restart,
-        "sender_restarts": timeline.restarts,
+        "ticks_skipped": actor.ticks_skipped,
+        "sender_restarts": actor.sender_restarts,
     }
 
 
@@ -105,7 +104,7 @@ def _hand(actor: Actor, side: Any) -> str:
 
 
 def _waited_ms(actors: Sequence[Actor]) -> float:
-    return 1e3 * max(actor.timeline.look_ahead_s for actor in actors)
+    return 1e3 * max(actor.look_ahead_s for actor in actors)
 
 
 def _finite(value: float) -> float | None:

@@ -13,7 +13,7 @@ from manipnet.config.settings import default_actor
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
-from manipnet.synthesis.ik.pose import allocate_poses, pose_by_least_squares
+from manipnet.synthesis.ik.pose import POSERS, SolverName, allocate_poses
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.layout import INPUT_SIZE
 from manipnet.synthesis.objects.library import load_library_mesh
@@ -31,7 +31,7 @@ LOOK_AHEAD_S = 0.4
 """So that there is something to forecast."""
 
 
-def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
+def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: SolverName = "least_squares") -> None:
     """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
     for shape in shapes:
         telemetry = Telemetry()
@@ -41,7 +41,7 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
         loop = TickLoop(
             "warm-up",
             [actor],
-            Synthesizer(bundle, on_stage=telemetry.stages.ended),
+            Synthesizer(bundle, solver, telemetry.stages.ended),
             lambda message: (encode_msgpack(message), encode_binary(message)),
             mailbox,
             FlightRecorder(Path(tempfile.gettempdir())),
@@ -56,14 +56,14 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
                 pass
 
 
-def pose_a_hand(bundle: Bundle) -> None:
+def pose_a_hand(bundle: Bundle, solver: SolverName = "least_squares") -> None:
     """Decode and solve: the kernel that this process compiles at a first start, while another compiles the rest."""
     shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
     outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]
     poses = allocate_poses(1)
     poses.correction[:] = 0.0
-    pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
+    POSERS[solver](shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from manipnet.config.settings import ConfigError
+from manipnet.common.options import ConfigError
 from manipnet_tools.commands import calibrate
 from manipnet_tools.commands.calibrate import CalibrateOptions, report, request
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from npm import run_node
 
-from manipnet.actors.actor import ShownHand
 from manipnet.actors.hands_message import hand_poses
-from manipnet.actors.transitions import Shown
+from manipnet.actors.transitions import ShownHand
 from manipnet.geometry import compose, mirror_points, quat_conjugate, quat_exp, quat_log, quat_multiply, transform
 from manipnet.recording.mcap_file import RecordingWriter, mesh_file
 from manipnet.synthesis.hand.kinematics import forward_kinematics
@@ -244,8 +243,8 @@ def test_a_hand_of_another_size_is_exported_at_its_size(performance: Animation, 
 
 def message(seq: int, t_s: float, x: float, state: str = "live", actor: str = "ann") -> HandsMessage:
     """A hands message of a half-closed left hand at `x`."""
-    shown = Shown(state, DOF_LIMITS_RAD @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
-    hands = hand_poses({"left": ShownHand(shown, "Box")}, 0.9)
+    shown = ShownHand(state, DOF_LIMITS_RAD @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), "Box")
+    hands = hand_poses({"left": shown}, 0.9)
     pose = np.array([x, 1.1, 0.0, 0.0, 0.0, 0.0, 1.0])
     bodies = (BodyPose(True, pose, "left_wrist"), BodyPose(state == "live", pose, "Box"))
     return HandsMessage("session", actor, seq, t_s, t_s + 0.6, 0.5, hands, bodies)

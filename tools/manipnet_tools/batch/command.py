@@ -14,8 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet_tools.batch.job import Job, Outcome, keep
 from manipnet_tools.batch.local import run_here

@@ -11,7 +11,7 @@ import tyro
 import zmq
 from rich.console import Console
 
-from manipnet.config.settings import ConfigError
+from manipnet.common.options import ConfigError
 from manipnet.net.curve_keys import read_client_keys
 from manipnet.net.zap import secure_client
 

@@ -14,9 +14,10 @@ import zmq
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from manipnet.common.options import parse_endpoint
 from manipnet.config.rig_reader import load_rig
-from manipnet.config.settings import parse_endpoint
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.curve_keys import read_client_keys
 from manipnet.net.zap import secure_client
 from manipnet.net.zmq_socket import MAX_WIRE_BYTES
@@ -110,7 +111,8 @@ def record_bodies(
     port: int, writer: RecordingWriter, going_on: Callable[[], bool], listening: Callable[[str], None]
 ) -> None:
     """Write every body frame sent to this machine's `port` while `going_on`; `listening` hears the address."""
-    receiver = ZmqBodies(lambda frame: writer.write_bodies(frame, time.time_ns()), Telemetry(), port=port)
+    intake = ZEROMQ.intake(lambda frame: writer.write_bodies(frame, time.time_ns()), Telemetry())
+    receiver = ZmqBodies(intake, port=port)
     receiver.start()
     try:
         listening(receiver.address)

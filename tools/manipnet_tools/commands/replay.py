@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from manipnet.config.settings import ConfigError, parse_endpoint
+from manipnet import inputs
+from manipnet.common.options import ConfigError, parse_endpoint
 from manipnet.geometry import Array, quat_slerp
-from manipnet.inputs.playback import BodySender, OscBodySender, Played, ZmqBodySender, looped, play
+from manipnet.inputs.playback import BodySender, Played, looped, play
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.signals import stop_on_signals
 from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
 
-PORTS = {"tcp": 5556, "osc": 39540}
 RATES_HZ = (1.0, 1000.0)
 SPEEDS = (0.01, 100.0)
 SHOW_S = 0.2
@@ -69,12 +69,14 @@ def run(options: ReplayOptions) -> None:
 
 
 def connect(url: str) -> BodySender:
-    """The sender to `tcp://HOST[:PORT]` or `osc://HOST[:PORT]`. Raises `ConfigError` and `PlayError`."""
+    """The sender to `SCHEME://HOST[:PORT]`, with a scheme of some input. Raises `ConfigError` and `PlayError`."""
     scheme, separator, rest = url.partition("://")
-    if not separator or scheme not in PORTS:
-        raise ConfigError(f"--to {url} must be tcp://HOST:PORT (ZeroMQ) or osc://HOST:PORT")
-    host, port = parse_endpoint(rest, PORTS[scheme])
-    return ZmqBodySender(host, port) if scheme == "tcp" else OscBodySender(host, port)
+    playable = {declared.scheme or declared.name: declared for declared in inputs.INPUTS if declared.player is not None}
+    declared = playable.get(scheme) if separator else None
+    if declared is None or declared.player is None or declared.default_port is None:
+        allowed = " or ".join(f"{scheme}://HOST:PORT" for scheme in playable)
+        raise ConfigError(f"--to {url} is not an address to play to; it must be {allowed}")
+    return declared.player(*parse_endpoint(rest, declared.default_port))
 
 
 def state(played: Played) -> str:

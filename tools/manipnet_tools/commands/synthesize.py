@@ -13,8 +13,7 @@ from rich.progress import Progress
 from manipnet.config.settings import WRISTS
 from manipnet.geometry import Array
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Synthesizer, hand_to_world

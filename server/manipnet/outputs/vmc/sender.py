@@ -12,11 +12,11 @@ import numpy as np
 
 from manipnet.geometry import Array, matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity
+from manipnet.outputs.declaration import EncodedHands, HandsOutput
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.skeleton import BONE_COUNT, DOF_COUNT, PARENTS
-from manipnet.wire import HandPose, HandsMessage, Side
+from manipnet.wire import HandPose, Side
 
-DEFAULT_PORT = 39539
 FOREARM_M = 0.25
 """Where the hand sits in the forearm, for receivers that apply positions too: nobody tracks the elbow."""
 
@@ -45,26 +45,28 @@ _T_POSE_DIRECTIONS[1:5] = [np.sqrt(0.5), np.sqrt(0.5), 0.0]
 """Where each bone of the receiver's T-pose points, in the wrist frame: fingers along the hand, thumb at 45 degrees."""
 
 
-class VmcSender:
+class VmcSender(HandsOutput):
     """Sends every message's hands to one receiver. Not thread-safe.
 
     `rest_pose_correction` turns each bone by what its direction at angle zero differs from the T-pose's, so that
     bones point where the hand's do; without it angle zero shows as the T-pose.
     """
 
-    def __init__(self, host: str, port: int = DEFAULT_PORT, rest_pose_correction: bool = True) -> None:
+    def __init__(self, host: str, port: int, rest_pose_correction: bool = True) -> None:
         self._address = (host, port)
         self._correction = _rest_pose_correction() if rest_pose_correction else _IDENTITY_CORRECTION
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._start_s: float | None = None
 
-    def send(self, message: HandsMessage) -> None:
-        """One datagram per hand. Raises `OSError` when the address cannot be reached at all."""
+    def send(self, hands: EncodedHands) -> bool:
+        """Send one datagram for each hand. Raises `OSError` if the address cannot be reached."""
+        message = hands.message
         if self._start_s is None:
             self._start_s = message.t_publish
         for side, hand in message.hands.items():
             bundle = hand_bundle(side, hand, message.t_publish - self._start_s, self._correction)
             self._socket.sendto(bundle, self._address)
+        return True
 
     def close(self) -> None:
         """Close the socket."""
