@@ -2,9 +2,7 @@
 
 import argparse
 import logging
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -106,18 +104,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     from manipnet.net.curve_keys import KeyFileError
     from manipnet.net.errors import ListenError
     from manipnet.runtime.console import Console
+    from manipnet.runtime.signals import stop_on_signals
     from manipnet.server import Server
     from manipnet.synthesis.model.bundle import BundleError
     from manipnet.synthesis.objects.mesh import MeshError
 
-    stop = _stop_on_signals()
     terminal = Console(as_json=arguments.log_format == "json")
     logging.basicConfig(level=logging.WARNING, handlers=[terminal], force=True)
     if not helper.idle:
         logging.getLogger(__name__).warning("first start here: some 15 s go by while code is compiled, once")
     try:
-        server = Server(configure(arguments), terminal.say, helper.wait)
-        server.run(stop.is_set)
+        with stop_on_signals() as stop:
+            server = Server(configure(arguments), terminal.say, helper.wait)
+            server.run(stop.is_set)
     except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
@@ -135,14 +134,6 @@ def _print_config(arguments: argparse.Namespace) -> int:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
     return 0
-
-
-def _stop_on_signals() -> threading.Event:
-    stop = threading.Event()
-    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), lambda *_: stop.set())
-    return stop
 
 
 def _option(group: Any, name: str, kind: type, metavar: str, text: str) -> None:

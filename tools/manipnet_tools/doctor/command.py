@@ -2,7 +2,6 @@
 
 import argparse
 import errno
-import json
 import logging
 import os
 import sys
@@ -11,8 +10,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
-
-import zmq
 
 from manipnet.config.rig_reader import load_rig
 from manipnet.config.settings import (
@@ -24,13 +21,14 @@ from manipnet.config.settings import (
     default_actor,
     parse_endpoint,
 )
+from manipnet.control.client import ControlClient
+from manipnet.control.request import RequestError
 from manipnet.inputs.natnet.client import NatNetBodies
 from manipnet.inputs.natnet.protocol import COMMAND_PORT
 from manipnet.inputs.osc.receiver import OscBodies
 from manipnet.inputs.zeromq import ZmqBodies
-from manipnet.net.curve_keys import KeyFileError, read_client_keys
+from manipnet.net.curve_keys import KeyFileError
 from manipnet.net.errors import ListenError
-from manipnet.net.zap import secure_client
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.doctor import from_status as self_report
@@ -154,20 +152,13 @@ def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
 
 
 def ask_status(host: str, port: int, key: Path | None = None) -> dict[str, Any] | None:
-    """The `status` of the server that runs there; None when none answers. Raises `KeyFileError`."""
-    with zmq.Context() as context, context.socket(zmq.REQ) as request:
-        request.setsockopt(zmq.LINGER, 0)
-        if key is not None:
-            secure_client(request, read_client_keys(key))
-        request.connect(f"tcp://{host}:{port}")
-        request.send(b'{"op": "status"}')
-        if not request.poll(int(1e3 * ANSWER_S)):
-            return None
-        try:
-            answer = json.loads(request.recv())
-        except ValueError:
-            return None
-    return answer if isinstance(answer, dict) and "counters" in answer else None
+    """The `status` of the server that runs there, or None if none answers. Raises `KeyFileError`."""
+    address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    try:
+        answer = ControlClient(address, key, ANSWER_S).ask("status")
+    except (OSError, RequestError):
+        return None
+    return answer if "counters" in answer else None
 
 
 def _cannot_listen(error: ListenError) -> Finding:
