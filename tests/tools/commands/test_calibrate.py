@@ -49,7 +49,7 @@ def test_the_answer_is_printed_with_its_quality() -> None:
     [
         ("127.0.0.1:1", "no server answers at tcp://127.0.0.1:1 .* start it with"),
         ("tcp://127.0.0.1:1", "no server answers at tcp://127.0.0.1:1 .* start it with"),
-        ("127.0.0.1:many", "a port is 1 … 65535"),
+        ("127.0.0.1:many", "a port of 1 … 65535"),
     ],
 )
 def test_without_a_server_the_remedy_is_printed(server: str, complaint: str, monkeypatch) -> None:
