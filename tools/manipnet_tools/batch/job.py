@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from manipnet import __version__
+from manipnet.common.atomic_file import replacing
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.commands.synthesize import read_shapes, synthesise, write_arrays
@@ -120,9 +121,8 @@ def finished(prepared: Prepared) -> Outcome | None:
 
 def keep(path: Path, content: bytes) -> None:
     """Write a file so that no reader ever sees a part of it. Raises `OSError`."""
-    part = path.with_name(f"{path.name}.part")
-    part.write_bytes(content)
-    part.replace(path)
+    with replacing(path) as file:
+        file.write(content)
 
 
 def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
