@@ -10,27 +10,29 @@ from pathlib import Path
 
 import pytest
 
+from manipnet.inputs import INPUTS
 from manipnet.runtime.console import Console
 from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.runtime.status import SilenceWatch
-from manipnet.telemetry import LABELS, Counters, RateLimit, Timings
-from manipnet.tracking.timeline import BodyHealth
+from manipnet.telemetry import DROP_REASONS, LABELS, RepeatFilter, Telemetry, Timings
+from manipnet.tracking.tick import BodyHealth
 from manipnet.wire.bodies import BodyFrame
 
 SOURCES = sorted((Path(__file__).parents[1] / "server").rglob("*.py"))
 
 
 def test_counters_count_by_label_from_any_thread() -> None:
-    counters = Counters()
+    telemetry = Telemetry()
+    telemetry.declare("frames_in", "osc")
     threads = [
-        threading.Thread(target=lambda: [counters.add("frames_in", source="osc") for _ in range(1000)])
+        threading.Thread(target=lambda: [telemetry.count("frames_in", source="osc") for _ in range(1000)])
         for _ in range(4)
     ]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert counters.snapshot() == {"frames_in": {"osc": 4000}}
+    assert telemetry.counts() == {"frames_in": {"osc": 4000}}
 
 
 @pytest.mark.parametrize(
@@ -38,8 +40,18 @@ def test_counters_count_by_label_from_any_thread() -> None:
     [("frames", {"source": "osc"}), ("frames_in", {"source": "pigeon"}), ("frames_in", {"by": "osc"})],
 )
 def test_a_counter_or_label_that_is_not_declared_is_an_error(name: str, label: dict[str, str]) -> None:
+    telemetry = Telemetry()
+    telemetry.declare("frames_in", "osc")
     with pytest.raises(KeyError):
-        Counters().add(name, **label)
+        telemetry.count(name, **label)
+
+
+def test_what_is_declared_twice_is_one_label() -> None:
+    telemetry = Telemetry()
+    telemetry.declare("frames_dropped", "malformed", "late")
+    telemetry.declare("frames_dropped", "malformed")
+    assert telemetry.labels()["frames_dropped"] == ("reason", (*DROP_REASONS, "malformed"))
+    assert Telemetry().labels()["frames_dropped"] == ("reason", DROP_REASONS)
 
 
 def test_every_count_in_the_source_is_declared() -> None:
@@ -47,10 +59,10 @@ def test_every_count_in_the_source_is_declared() -> None:
     found = 0
     for path in SOURCES:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "add"):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "count"):
                 continue
-            if not (node.args and isinstance(node.args[0], ast.Constant) and isinstance(node.args[0].value, str)):
-                continue
+            if not (node.keywords and isinstance(node.args[0], ast.Constant) and isinstance(node.args[0].value, str)):
+                continue  # counts characters of a text
             label, values = LABELS[node.args[0].value]
             (keyword,) = node.keywords
             assert keyword.arg == label, f"{path.name}:{node.lineno}"
@@ -58,6 +70,16 @@ def test_every_count_in_the_source_is_declared() -> None:
                 assert keyword.value.value in values, f"{path.name}:{node.lineno}"
             found += 1
     assert found > 10
+
+
+def test_every_reason_for_which_a_receiver_drops_is_declared() -> None:
+    for declared in INPUTS:
+        module = sys.modules[declared.open.__module__]
+        source = Path(str(module.__file__))
+        files = source.parent.rglob("*.py") if source.name == "__init__.py" else [source]
+        text = "".join(path.read_text(encoding="utf-8") for path in files)
+        assert set(re.findall(r'drop\(\s*"(\w+)"', text)) | {"malformed"} <= {*declared.drop_reasons}
+        assert all(f'"{reason}"' in text for reason in declared.drop_reasons)
 
 
 def test_timings_keep_all_and_the_newest() -> None:
@@ -70,13 +92,21 @@ def test_timings_keep_all_and_the_newest() -> None:
     assert timings.totals("total") == (1000, pytest.approx(500.5))
 
 
+def test_gauges_are_read_when_they_are_asked_for() -> None:
+    telemetry, level = Telemetry(), {"hands": 1.0}
+    telemetry.add_gauges(lambda: [("connections", "socket", dict(level))])
+    telemetry.add_gauges(lambda: iter(()))
+    level["hands"] = 2.0
+    assert list(telemetry.gauges()) == [("connections", "socket", {"hands": 2.0})]
+
+
 def record(text: str, level: int = logging.WARNING) -> logging.LogRecord:
     return logging.LogRecord("manipnet", level, __file__, 1, text, (), None)
 
 
 def test_a_line_that_repeats_is_held_back_and_summed_up() -> None:
     now = [0.0]
-    limit = RateLimit(lambda: now[0], interval_s=5.0)
+    limit = RepeatFilter(lambda: now[0], interval_s=5.0)
     shown = []
     for second in range(12):
         now[0] = float(second)
@@ -109,18 +139,18 @@ def a_frame(t_s: float) -> BodyFrame:
 
 
 def test_the_mailbox_keeps_the_newest_frames_and_counts_the_others() -> None:
-    counters = Counters()
-    mailbox = Mailbox(counters)
+    telemetry = Telemetry()
+    mailbox = Mailbox(telemetry)
     for i in range(MAX_FRAMES + 7):
         mailbox.put(a_frame(float(i)))
     frames = mailbox.wait(0.0)
     assert [frame.t_s for frame in frames] == [float(i) for i in range(7, MAX_FRAMES + 7)]
-    assert counters.snapshot() == {"frames_dropped": {"mailbox_full": 7}}
+    assert telemetry.counts() == {"frames_dropped": {"mailbox_full": 7}}
     assert mailbox.wait(0.0) == []
 
 
 def test_a_question_is_answered_on_the_tick_thread() -> None:
-    mailbox, answers = Mailbox(Counters()), []
+    mailbox, answers = Mailbox(Telemetry()), []
     asking = threading.Thread(target=lambda: answers.append(mailbox.ask(threading.get_ident, timeout_s=20.0)))
     asking.start()
     while not answers:
@@ -132,7 +162,7 @@ def test_a_question_is_answered_on_the_tick_thread() -> None:
 
 
 def test_an_error_in_a_question_goes_to_who_asked() -> None:
-    mailbox, errors = Mailbox(Counters()), []
+    mailbox, errors = Mailbox(Telemetry()), []
 
     def ask() -> None:
         with pytest.raises(ZeroDivisionError):
@@ -147,7 +177,7 @@ def test_an_error_in_a_question_goes_to_who_asked() -> None:
 
 
 def test_questions_nobody_answers_are_given_up_and_bounded() -> None:
-    mailbox = Mailbox(Counters())
+    mailbox = Mailbox(Telemetry())
     for _ in range(MAX_REQUESTS):
         with pytest.raises(BusyError, match="did not answer"):
             mailbox.ask(lambda: None, timeout_s=0.0)

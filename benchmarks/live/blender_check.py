@@ -1,21 +1,26 @@
 """Run the Blender extension in a real Blender: connect, pose an armature, record, read the keyframes back.
 
-With the PyPI module (`pip install bpy numpy`, no window): `python benchmarks/live/blender_check.py
-tcp://127.0.0.1:5555`; in Blender itself: `blender -b --python benchmarks/live/blender_check.py --
-tcp://127.0.0.1:5555`. A server must run there, for example `manipnet-serve --demo`. Blender without a window runs no
-timers, so this calls the timer's function.
+With the module `bpy` of PyPI (`pip install bpy numpy`), which has no window:
+`python benchmarks/live/blender_check.py tcp://127.0.0.1:5555`. In Blender itself:
+`blender -b --python benchmarks/live/blender_check.py -- tcp://127.0.0.1:5555`. A server must run at that address, for
+example `manipnet-serve --demo`. Blender without a window does not run timers, so this script calls the function of the
+extension's timer.
 """
 
 import math
 import sys
+import tempfile
 import time
 from pathlib import Path
 
-import bpy
+import bpy  # pyright: ignore[reportMissingImports]
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "clients" / "blender"))
-import manipnet_live
-from manipnet_live.session import session
+import package  # pyright: ignore[reportMissingImports]
+
+sys.path.insert(0, str(package.write_unpacked(Path(tempfile.mkdtemp())).parent))
+import manipnet_live  # pyright: ignore[reportMissingImports]
+from manipnet_live.session import session  # pyright: ignore[reportMissingImports]
 
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 KNUCKLES = ((0.04, 0.03), (0.1, 0.03), (0.105, 0.0), (0.1, -0.02), (0.09, -0.04))

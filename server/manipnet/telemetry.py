@@ -1,36 +1,29 @@
-"""What is counted and timed while a session runs, and the log that cannot be flooded.
+"""What one session counts and measures: one `Telemetry` object, which is handed down to whoever reports something.
 
-Every counter and the values of its label are declared here: the sets are closed, so no sender can make them
-grow.
+Every counter has one label. The counters are declared here, with the values that their labels may take; the protocols
+add theirs with `Telemetry.declare` when they open. The sets are closed from then on, so a sender cannot make them grow.
 """
 
 import logging
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
 import numpy as np
 from hdrh.histogram import HdrHistogram
 
-SOURCES = ("zmq", "osc", "natnet")
 DROP_REASONS = (
-    "malformed",  # not a message of the protocol, or one that breaks its rules
-    "oversized",  # larger than any message may be
-    "not_allowed",  # a sender that is on no allow-list
-    "rate",  # a source that sends garbage faster than it is worth reading
-    "kernel",  # lost in the socket's buffer before it was read
-    "unsupported",  # a version or message kind that is not understood
-    "incomplete",  # a part of the frame did not arrive
     "duplicate",  # the same instant twice
-    "internal",  # a fault of our own while a frame was taken in
+    "internal",  # a fault of the server while it took the frame in
     "late",  # older than what was already accepted
-    "unknown_body",  # nothing in it that the rig knows
-    "other_sender",  # a second sender of the same bodies while the first one is heard
-    "time_jump",  # far from the stream's time, and no others with it
+    "unknown_body",  # the rig knows none of its bodies
+    "other_sender",  # a second sender of the same bodies while the first one still sends
+    "time_jump",  # far from the stream's time, and no other frames near it
     "mailbox_full",  # the tick loop could not keep up
 )
+"""Why frames of any protocol are dropped once they have arrived; `Input.drop_reasons` are the protocols' own."""
 BODY_REASONS = (
     "nan",
     "bounds",
@@ -47,55 +40,89 @@ CONTROL_OPS = (
 )
 
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "frames_in": ("source", SOURCES),
+    "frames_in": ("source", ()),
     "frames_dropped": ("reason", DROP_REASONS),
     "bodies_rejected": ("reason", BODY_REASONS),
-    "sender_restarts": ("source", SOURCES),
+    "sender_restarts": ("source", ()),
     "connections_refused": ("reason", ("handshake", "not_listed", "too_many", "endless")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
-    "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "web")),
+    "messages_out": ("topic", ()),
     "control_requests": ("op", CONTROL_OPS),
     "recorded": ("fate", ("written", "lost")),
     "page_frames": ("fate", ("shown", "skipped")),
     "page_ended": ("reason", ("crash",)),
 }
-"""Every counter with its one label and the values that label may take."""
+"""Every counter with its one label and the values of it that are known without the protocols."""
 
 
 STAGES: Final = ("sense", "infer", "ik", "encode", "total", "interval")
-"""What `Timings` records, seconds; `total` runs from the packet a tick waited for to its message sent."""
+"""The durations that `Timings` records, in seconds. `total` runs from the arrival of the packet that a tick waited for
+until the tick's message is sent.
+"""
+
+Gauge = tuple[str, str, Mapping[str, float]]
+"""A measurement of this moment: its name, the name of its label, and the level by each of the few label values."""
+GaugeSource = Callable[[], Iterable[Gauge]]
 
 
-class Counters:
-    """Rising counters: `add("frames_dropped", reason="late")`. An unknown name or label is a `KeyError`."""
+class Telemetry:
+    """Counters, durations and gauges of one session. Thread-safe, except `stages`, which belongs to the tick thread."""
 
     def __init__(self) -> None:
+        self.timings = Timings()
+        self.stages = StageClock(self.timings)
         self._lock = threading.Lock()
-        self._values: Counter[tuple[str, str]] = Counter()
+        self._labels = dict(LABELS)
+        self._counts: Counter[tuple[str, str]] = Counter()
+        self._gauges: list[GaugeSource] = []
 
-    def add(self, name: str, n: int = 1, **label: str) -> None:
-        key, allowed = LABELS[name]
+    def count(self, name: str, n: int = 1, **label: str) -> None:
+        """Raise a counter by `n`: `count("frames_dropped", reason="late")`.
+
+        Raises `KeyError` for a counter or a label value that is not declared.
+        """
+        key, allowed = self._labels[name]
         value = label[key]
         if value not in allowed:
-            raise KeyError(f"{name}: {key} {value!r} is none of {', '.join(allowed)}")
+            raise KeyError(f"{name}: {key} {value!r} is not declared; allowed are {', '.join(allowed)}")
         with self._lock:
-            self._values[name, value] += n
+            self._counts[name, value] += n
 
-    def snapshot(self) -> dict[str, dict[str, int]]:
-        """`{name: {label value: count}}`, only what was counted at least once."""
+    def declare(self, name: str, *values: str) -> None:
+        """Let the label of the counter `name` take these values too."""
         with self._lock:
-            values = dict(self._values)
+            label, known = self._labels[name]
+            self._labels[name] = label, tuple(dict.fromkeys((*known, *values)))
+
+    def labels(self) -> dict[str, tuple[str, tuple[str, ...]]]:
+        """Every counter with its one label and the values that the label may take."""
+        with self._lock:
+            return dict(self._labels)
+
+    def counts(self) -> dict[str, dict[str, int]]:
+        """`{name: {label value: count}}` of everything that was counted at least once."""
+        with self._lock:
+            counts = dict(self._counts)
         result: dict[str, dict[str, int]] = {}
-        for (name, value), count in sorted(values.items()):
+        for (name, value), count in sorted(counts.items()):
             result.setdefault(name, {})[value] = count
         return result
 
+    def add_gauges(self, source: GaugeSource) -> None:
+        """Let `gauges` include what `source` measures; it is called on the thread that reads the gauges."""
+        self._gauges.append(source)
+
+    def gauges(self) -> Iterator[Gauge]:
+        """Everything that is measured at this moment."""
+        for source in tuple(self._gauges):
+            yield from source()
+
 
 class Timings:
-    """Durations per stage: all since the start, and the newest `window` of them for the second's line."""
+    """Durations by stage: statistics since the start, and the newest `window` durations for the line of each second."""
 
     def __init__(self, window: int = 960) -> None:
         self._lock = threading.Lock()
@@ -104,69 +131,89 @@ class Timings:
         self._recent = {stage: deque[float](maxlen=window) for stage in STAGES}
 
     def record(self, stage: str, seconds: float) -> None:
-        """Add one duration; microsecond resolution, 1 µs to 60 s."""
+        """Add one duration, with a resolution of 1 µs and at most 60 s."""
         with self._lock:
             self._all[stage].record_value(min(max(int(seconds * 1e6), 1), 60_000_000))
             self._recent[stage].append(seconds)
             self._sums_s[stage] += seconds
 
     def recent(self, stage: str, *percentiles: float) -> list[float]:
-        """Percentiles of the newest durations in seconds, emptied by reading; zeros when there are none."""
+        """Percentiles, in seconds, of the durations since the last call, or zeros if there are none."""
         with self._lock:
             values = list(self._recent[stage])
             self._recent[stage].clear()
         return [float(v) for v in np.percentile(values, percentiles)] if values else [0.0] * len(percentiles)
 
     def overall(self, stage: str, *percentiles: float) -> list[float]:
-        """Percentiles since the start, seconds."""
+        """Percentiles, in seconds, of all durations since the start."""
         with self._lock:
             return [self._all[stage].get_value_at_percentile(p) * 1e-6 for p in percentiles]
 
     def totals(self, stage: str) -> tuple[int, float]:
-        """How many durations were recorded since the start, and their sum in seconds."""
+        """The number of durations since the start, and their sum in seconds."""
         with self._lock:
             return int(self._all[stage].get_total_count()), self._sums_s[stage]
 
 
 class StageClock:
-    """Times the stages of one tick as they end, one after another. Belongs to the tick thread."""
+    """Measures the stages of a tick, which follow one another. Belongs to the tick thread."""
 
     def __init__(self, timings: Timings) -> None:
         self._timings = timings
         self._since_s = 0.0
         self.last_ms: dict[str, float] = {}
-        """The stages of the newest tick, milliseconds."""
+        """The stages of the newest tick, in milliseconds."""
 
     def begin(self) -> None:
-        """A tick begins."""
+        """The first stage of a tick begins."""
         self.last_ms, self._since_s = {}, time.monotonic()
 
     def ended(self, stage: str) -> None:
-        """A stage has ended, and the next begins."""
+        """The stage `stage` has ended, and the next one begins."""
         now_s = time.monotonic()
         self._timings.record(stage, now_s - self._since_s)
         self.last_ms[stage] = 1e3 * (now_s - self._since_s)
         self._since_s = now_s
 
 
-class RateLimit(logging.Filter):
-    """Lets each message template through once per `interval_s`; the next one says how many it stands for."""
+class LogThrottle:
+    """Lets one log line per key pass in each interval and counts the lines that it holds back. Thread-safe."""
 
-    def __init__(self, clock: Callable[[], float], interval_s: float = 5.0) -> None:
+    def __init__(self, interval_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self._interval_s, self._clock = interval_s, clock
+        self._lock = threading.Lock()
+        self._shown: dict[str, tuple[float, int]] = {}
+
+    def admit(self, key: str, n: int = 1) -> int | None:
+        """How many lines of this key were held back since the last one, if a line may be logged now; else None.
+
+        A line that may not be logged counts as `n` lines.
+        """
+        now_s = self._clock()
+        with self._lock:
+            shown_s, held_back = self._shown.get(key, (float("-inf"), 0))
+            if now_s - shown_s < self._interval_s:
+                self._shown[key] = (shown_s, held_back + n)
+                return None
+            self._shown[key] = (now_s, 0)
+            return held_back
+
+
+class RepeatFilter(logging.Filter):
+    """Lets each message template pass once per `interval_s`; the next line says how many more there were."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, interval_s: float = 5.0) -> None:
         super().__init__()
-        self._clock, self._interval_s = clock, interval_s
-        self._last: dict[str, tuple[float, int]] = {}
+        self._throttle = LogThrottle(interval_s, clock)
 
     def filter(self, record: logging.LogRecord) -> bool:
+        """Whether a record may pass; those below WARNING always do."""
         if record.levelno < logging.WARNING:
             return True
-        # Templates are literals of our code, so this map stays small whatever arrives.
-        now, key = self._clock(), f"{record.name}:{record.msg}"
-        shown_at, held_back = self._last.get(key, (float("-inf"), 0))
-        if now - shown_at < self._interval_s:
-            self._last[key] = (shown_at, held_back + 1)
+        # The templates are literals in the source, so the number of keys stays small whatever arrives.
+        held_back = self._throttle.admit(f"{record.name}:{record.msg}")
+        if held_back is None:
             return False
-        self._last[key] = (now, 0)
         record.event = record.msg
         if held_back:
             record.msg = f"{record.msg} (and {held_back} more like it)"

@@ -20,6 +20,7 @@ from manipnet.actors.calibration import (
     upright_on_sheet,
     wrist_on_sheet,
 )
+from manipnet.actors.plan import synthesise
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, BodyConfig
 from manipnet.geometry import Array, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
@@ -30,7 +31,7 @@ from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Side, Synthesizer
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 HAND = shipped_hand()
@@ -214,7 +215,7 @@ def around(shape_scale: float, t_s: float, size: float) -> dict[str, Array]:
 
 def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array], size: float = 1.0) -> Array:
     """Angles `(ticks, 2, 20)` of an actor whose tracker sees the wrists through `clusters`, T_wrist_cluster each."""
-    actor = Actor(config, [Prop("box", "cube", shape)], bundle, Counters(), 0.1)
+    actor = Actor(config, [Prop("box", "cube", shape)], bundle, Telemetry(), 0.1)
     actor.carry("box", "cube", shape, 1.4 * size)
     synthesizer, shown = Synthesizer(bundle), []
     for i in range(round(SECONDS * 120)):
@@ -222,11 +223,11 @@ def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array
         poses |= {name: compose(poses[name], T) for name, T in clusters.items()}
         bodies = tuple(BodySample(None, name, tuple(T[:3]), tuple(T[3:]), True) for name, T in poses.items())
         actor.push(BodyFrame(i / 120, None, bodies, i / 120, "zmq:test"))
-        while (tick := actor.timeline.poll(i / 120)) is not None:
+        while (tick := actor.poll(i / 120)) is not None:
             plan = actor.plan(tick)
-            steps = synthesizer.step(list(plan.scenes.values()), list(plan.memories.values()))
-            hands = actor.show(plan, dict(zip(plan.scenes, steps, strict=True)))
-            shown.append([hands[side].shown.angles for side in SIDES])
+            synthesise([plan], synthesizer)
+            hands = actor.show(plan)
+            shown.append([hands[side].angles for side in SIDES])
     return np.array(shown)
 
 
@@ -268,14 +269,14 @@ def test_a_new_offset_takes_the_past_along(bundle, cube: Shape) -> None:
     offset = pose((0.02, 0.03, -0.01), (0.1, 0.3, -0.2, 0.9))
     actors = {}
     for name, config in (("late", actor_config()), ("always", actor_config({"right_wrist": offset}))):
-        actor = Actor(config, [Prop("box", "cube", cube)], bundle, Counters(), 0.1)
+        actor = Actor(config, [Prop("box", "cube", cube)], bundle, Telemetry(), 0.1)
         for i in range(60):
             T = around(1.4, i / 120, 1.0)["right_wrist"]
             sample = BodySample(None, "right_wrist", tuple(T[:3]), tuple(T[3:]), True)
             actor.push(BodyFrame(i / 120, None, (sample,), i / 120, "zmq:test"))
         actors[name] = actor
     actors["late"].place("right_wrist", offset)
-    late, always = (actors[name].timeline.poll(1.0).bodies["right_wrist"].window for name in ("late", "always"))
+    late, always = (actors[name].poll(1.0).bodies["right_wrist"].window for name in ("late", "always"))
     assert np.allclose(late, always, atol=1e-12)
     assert np.array_equal(actors["late"].config.wrists["right_wrist"].offset, offset)
     raw = [actor.body_poses("right_wrist", 2.0) for actor in actors.values()]

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipnet.actors.output_guard import MAX_SPEED_RAD_S, MAX_WRIST_RAD_S, NotFiniteError, OutputGuard
-from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, Shown, State, state_at_age
+from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, ShownHand, state_at_age
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet.telemetry import Counters
-from manipnet.tracking.timeline import TICK_S
+from manipnet.telemetry import Telemetry
+from manipnet.tracking.tick import TICK_S
+from manipnet.wire import State
 
 HAND = shipped_hand()
 
@@ -23,13 +24,13 @@ THERE = np.concatenate([[0.6, 1.2, -0.3], quat_exp(np.array([0.0, 1.5, 0.3]))])
 
 
 def presence() -> PoseTransition:
-    return PoseTransition(REST, OutputGuard(HAND.limits, Counters()))
+    return PoseTransition(REST, OutputGuard(HAND.limits, Telemetry()))
 
 
 def run(
-    hand: PoseTransition, ticks: int, state: State, angles, wrist, run: int = 0, held: object = "mug"
-) -> list[Shown]:
-    shown = [hand.show(state, angles, wrist, run, held, TICK_S) for _ in range(ticks)]
+    hand: PoseTransition, ticks: int, state: State, angles, wrist, run: int = 0, prop: str = "mug"
+) -> list[ShownHand]:
+    shown = [hand.show(state, angles, wrist, run, prop, TICK_S) for _ in range(ticks)]
     return [each for each in shown if each is not None]
 
 
@@ -101,7 +102,7 @@ def test_no_sequence_of_events_makes_it_jump_leave_its_limits_or_lose_its_finite
         state = data.draw(st.sampled_from(["live", "hold", "rest"]))
         angles = low + (high - low) * data.draw(st.floats(0.0, 1.0)) if state == "live" else None
         wrist = data.draw(st.sampled_from([HERE, THERE, None]))
-        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i, i):
+        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i, str(i)):
             assert np.isfinite(shown.angles).all()
             assert np.isfinite(shown.wrist).all()
             assert np.all((low <= shown.angles) & (shown.angles <= high))
@@ -154,14 +155,14 @@ def test_the_first_pose_shown_is_inside_the_limits_too() -> None:
 
 
 def test_angles_outside_the_limits_or_too_fast_are_kept_in_and_counted() -> None:
-    counters = Counters()
-    hand = PoseTransition(REST, OutputGuard(HAND.limits, counters))
+    telemetry = Telemetry()
+    hand = PoseTransition(REST, OutputGuard(HAND.limits, telemetry))
     run(hand, 1, "live", HAND.limits[:, 0], HERE)
     (shown,) = run(hand, 1, "live", FIST + 1.0, HERE)
     steps = shown.angles - HAND.limits[:, 0]
     assert steps.max() == pytest.approx(MAX_SPEED_RAD_S * TICK_S)
     assert np.all(shown.angles <= FIST)
-    assert counters.snapshot()["output_guarded"] == {"limit": 1, "speed": 1}
+    assert telemetry.counts()["output_guarded"] == {"limit": 1, "speed": 1}
 
 
 def test_a_wrist_that_was_guessed_glides_to_where_it_is() -> None:

@@ -1,20 +1,23 @@
-"""The Blender extension on a fake `bpy`: live on an armature and as empties, keyframes in bulk, nothing left behind."""
+"""The packaged Blender extension on a fake `bpy`: live on an armature and as empties, keyframes, a clean exit."""
 
 import importlib
 import sys
 import threading
 import time
 import tomllib
+import zipfile
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from checkout import CLIENTS, publishing
+from blender import package
+from checkout import ROOT, publishing
 from joint_poses import assert_joints
 from manipnet_client import decode
 from manipnet_client.retarget import BONES
-from test_retarget import ENDS, posed
+from random_hand import ENDS, posed
 
+from manipnet import __version__
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate, quat_to_matrix
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -22,15 +25,20 @@ from manipnet.wire import encode_binary
 
 HAND = shipped_hand()
 
-EXTENSION = CLIENTS / "blender" / "manipnet_live"
 FAKE = ("bpy", "mathutils", "manipnet_live")
 
 
+@pytest.fixture(scope="module")
+def packaged(tmp_path_factory):
+    """The folder that holds the extension as packaging writes it."""
+    return package.write_unpacked(tmp_path_factory.mktemp("extensions")).parent
+
+
 @pytest.fixture
-def blender(monkeypatch):
+def blender(packaged, monkeypatch):
     """The extension, registered in a fresh fake Blender."""
-    monkeypatch.syspath_prepend(str(CLIENTS.parent / "tests" / "clients" / "fake_blender"))
-    monkeypatch.syspath_prepend(str(EXTENSION.parent))
+    monkeypatch.syspath_prepend(str(ROOT / "tests" / "clients" / "fake_blender"))
+    monkeypatch.syspath_prepend(str(packaged))
     extension = importlib.import_module("manipnet_live")
     extension.register()
     yield SimpleNamespace(extension=extension, session=extension.session, bpy=sys.modules["bpy"])
@@ -46,7 +54,7 @@ def pose_of(position, rotation):
 
 
 def armature(bpy, rng):
-    """Both hands with Mixamo's names, hand and finger bones turned at random, in a T-pose of our own."""
+    """Both hands in a T-pose, with Mixamo's bone names and randomly rotated hand and finger bones."""
     positions, _ = forward_kinematics(HAND, np.zeros(20))
     bones = []
     for side, sign in (("Left", -1.0), ("Right", 1.0)):
@@ -79,7 +87,10 @@ def quat_of(matrix):
 
 
 def posed_rotations(thing, side):
-    """Blender's own rule: a bone's pose is its parent's, times its rest in the parent's, times its own rotation."""
+    """The finger bones of a side and their posed rotations `(15, 4)` by Blender's rule.
+
+    A bone's pose is its parent's pose, times its rest pose relative to its parent's, times its own rotation.
+    """
     world = {}
     for bone in thing.data.bones:
         rest = quat_of(bone.matrix_local)
@@ -106,7 +117,7 @@ def test_bones_point_where_the_hand_does(blender, side):
     bind = np.array([bone.tail_local - bone.head_local for bone in bones])
     shown = quat_rotate(quat_multiply(turned, quat_conjugate(rest)), bind)
     shown /= np.linalg.norm(shown, axis=1, keepdims=True)
-    # Up to one common turn, that of the hand itself: compare the angles between all bones.
+    # The rotation of the hand itself is unknown here, so the angles between all pairs of bones are compared.
     np.testing.assert_allclose(shown @ shown.T, along @ along.T, atol=1e-5)
 
 
@@ -125,7 +136,7 @@ def show_until(blender, condition, limit_s=20.0):
         time.sleep(0.005)
 
 
-def test_live_recorded_and_gone(blender):
+def test_a_live_session_is_recorded_and_leaves_nothing_behind(blender):
     threads = threading.active_count()
     thing = armature(blender.bpy, np.random.default_rng(4))
     session = blender.session
@@ -139,7 +150,7 @@ def test_live_recorded_and_gone(blender):
     assert threading.active_count() == threads
     assert not blender.bpy.app.timers.registered
     curves = thing.animation_data.action.curves
-    assert len(curves) == 2 * (16 * 4 + 3)  # fingers and wrists turn, wrists move
+    assert len(curves) == 2 * (16 * 4 + 3)  # rotations of fingers and wrists, locations of wrists
     assert thing.animation_data.action_slot == ("OBJECT", "Rig")
     assert frames > 5
     for curve in curves.values():
@@ -165,7 +176,7 @@ def test_actions_without_slots(blender):
     np.testing.assert_allclose([px, pz], [[0.0, 0.2, 0.4, 0.6], [1.0] * 4], atol=1e-9)
 
 
-def test_empties_stand_where_the_joints_are(blender):
+def test_empties_follow_the_joints(blender):
     session, objects = blender.session, blender.bpy.data.objects
     with publishing() as (_, tcp, _):
         session.start(tcp, "", 0.05, None, False)
@@ -195,7 +206,7 @@ def test_a_wrong_address_is_reported(blender):
     assert not blender.session.is_running
 
 
-def test_the_panel_tells_what_goes_on(blender):
+def test_the_panel_shows_state_rate_and_losses(blender):
     panel, drawn = importlib.import_module("manipnet_live.panel"), []
     layout = SimpleNamespace(
         column=lambda: SimpleNamespace(prop=lambda _, name: drawn.append(name)),
@@ -217,8 +228,15 @@ def test_the_panel_tells_what_goes_on(blender):
     assert drawn[-1].endswith(" lost")
 
 
-def test_manifest():
-    manifest = tomllib.loads((EXTENSION / "blender_manifest.toml").read_text(encoding="utf-8"))
+def test_the_zip_holds_the_manifest_and_the_client(tmp_path):
+    path = package.write_zip(tmp_path / "dist")
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+        manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
+    assert path.name == f"manipnet_live-{__version__}.zip"
+    assert {"__init__.py", "manipnet_client/__init__.py", "manipnet_client/layout.py"} <= set(names)
+    assert not [name for name in names if "__pycache__" in name or name.endswith(".md")]
+    assert manifest["version"] == __version__
     assert manifest["blender_version_min"] == "4.2.0"
-    assert manifest["id"] == EXTENSION.name
+    assert manifest["id"] == package.EXTENSION.name
     assert set(manifest["permissions"]) == {"network"}

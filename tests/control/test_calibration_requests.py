@@ -17,7 +17,7 @@ from manipnet.control.request import RequestError
 from manipnet.geometry import compose, invert, quat_exp
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 HAND = shipped_hand()
@@ -37,8 +37,8 @@ def rig(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def actors_proxy(rig: Path) -> Iterator[ActorsProxy]:
-    bundle = SimpleNamespace(rest_angles=np.zeros(HAND.angle_count), limits=HAND.limits)
-    mailbox, stop = Mailbox(Counters()), threading.Event()
+    bundle = SimpleNamespace(hand=HAND, rest_angles=np.zeros(HAND.angle_count), limits=HAND.limits)
+    mailbox, stop = Mailbox(Telemetry()), threading.Event()
 
     def tick() -> None:
         while not stop.is_set():
@@ -46,7 +46,7 @@ def actors_proxy(rig: Path) -> Iterator[ActorsProxy]:
 
     thread = threading.Thread(target=tick)
     thread.start()
-    yield ActorsProxy([Actor(load_rig(rig).actors[0], [], bundle, Counters(), 0.0)], mailbox)  # pyright: ignore
+    yield ActorsProxy([Actor(load_rig(rig).actors[0], [], bundle, Telemetry(), 0.0)], mailbox)  # pyright: ignore
     stop.set()
     thread.join()
 

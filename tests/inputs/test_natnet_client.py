@@ -12,28 +12,36 @@ import pytest
 from fake_motive import CLOCK_HZ, FakeMotive
 from natnet_writer import Body, Frame, packet, server_info
 
+from manipnet.inputs.natnet import NATNET
 from manipnet.inputs.natnet import client as natnet_client
 from manipnet.inputs.natnet.client import NatNetBodies
 from manipnet.inputs.natnet.frames import read_frame
+from manipnet.inputs.natnet.options import COMMAND_PORT, NatNetOptions
 from manipnet.net.errors import ListenError
 
 VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5)]
 Q = (0.0, 0.6, 0.0, 0.8)
 
 
+def client_of(heard, telemetry, host, port=COMMAND_PORT, allow=(), **options):
+    """A client of the server at `host:port`."""
+    return NatNetBodies(NATNET.intake(heard, telemetry), NatNetOptions((host, port), **options), allow)
+
+
 @pytest.fixture(autouse=True)
 def _hurry(monkeypatch):
     """Chores that are done every second in life are done ten times as often here."""
-    for period in ("KNOCK_S", "KEEP_ALIVE_S", "ECHO_S"):
+    for period in ("CONNECT_S", "KEEP_ALIVE_S", "ECHO_S"):
         monkeypatch.setattr(natnet_client, period, 0.1)
 
 
 @pytest.fixture
-def connect(heard, counters):
+def connect(heard, telemetry):
     clients = []
 
     def connect(motive, **options):
-        client = NatNetBodies(heard, counters, "127.0.0.1", motive.port, **options)
+        allow = options.pop("allow", ())
+        client = client_of(heard, telemetry, "127.0.0.1", motive.port, allow, **options)
         clients.append(client)
         client.start()
         motive.wait_for(0)
@@ -146,11 +154,11 @@ def test_the_client_is_kept_alive(connect):
         motive.wait_for(10, 2)
 
 
-def test_a_server_that_comes_late_is_found(heard, counters):
+def test_a_server_that_comes_late_is_found(heard, telemetry):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as placeholder:
         placeholder.bind(("127.0.0.1", 0))
         port = placeholder.getsockname()[1]
-        client = NatNetBodies(heard, counters, "127.0.0.1", port)
+        client = client_of(heard, telemetry, "127.0.0.1", port)
         client.start()
         assert placeholder.recv(1_000)[:2] == b"\0\0"
         assert client.status()["state"] == "connecting"
@@ -221,7 +229,7 @@ def test_what_is_wrong_is_said_once_with_the_remedy_and_stays_said(connect, warn
         (packet(13, b""), "malformed"),
     ],
 )
-def test_good_frame_after_garbage(connect, heard, counters, garbage, reason):
+def test_good_frame_after_garbage(connect, heard, telemetry, garbage, reason):
     with FakeMotive() as motive:
         connect(motive)
         motive.wait_for(4)
@@ -231,10 +239,10 @@ def test_good_frame_after_garbage(connect, heard, counters, garbage, reason):
             motive._data.sendto(garbage, client)
         motive.send(write((3, 0), 2))
         assert heard.next().frame == 2
-    assert counters.snapshot()["frames_dropped"] == {reason: 1}
+    assert telemetry.counts()["frames_dropped"] == {reason: 1}
 
 
-def test_packets_of_no_interest_are_passed_over(connect, heard, counters):
+def test_packets_of_no_interest_are_passed_over(connect, heard, telemetry):
     with FakeMotive() as motive:
         connect(motive)
         motive.wait_for(4)
@@ -242,10 +250,10 @@ def test_packets_of_no_interest_are_passed_over(connect, heard, counters):
             motive.send(b"whatever", message_id)
         motive.send(write((3, 0), 2))
         assert heard.next().frame == 2
-    assert "frames_dropped" not in counters.snapshot()
+    assert "frames_dropped" not in telemetry.counts()
 
 
-def test_other_hosts_are_refused(connect, heard, counters):
+def test_other_hosts_are_refused(connect, heard, telemetry):
     with FakeMotive() as motive, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         connect(motive)
         motive.wait_for(4)
@@ -254,10 +262,10 @@ def test_other_hosts_are_refused(connect, heard, counters):
             stranger.sendto(packet(7, write((3, 0), 666)), client)
         motive.send(write((3, 0), 1))
         assert heard.next().frame == 1
-    assert counters.snapshot()["frames_dropped"] == {"not_allowed": 1}
+    assert telemetry.counts()["frames_dropped"] == {"not_allowed": 1}
 
 
-def test_frames_may_come_from_listed_networks_but_answers_only_from_the_server(connect, heard, counters):
+def test_frames_may_come_from_listed_networks_but_answers_only_from_the_server(connect, heard, telemetry):
     with FakeMotive() as motive, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as second_card:
         client = connect(motive, allow=[ipaddress.ip_network("127.0.0.2/32")])
         motive.wait_for(12)
@@ -269,7 +277,7 @@ def test_frames_may_come_from_listed_networks_but_answers_only_from_the_server(c
             second_card.sendto(packet(7, write((3, 0), 2)), address)
         assert heard.next().frame == 2
         assert client.status()["server"] == "Motive, NatNet 3.0"
-    assert "frames_dropped" not in counters.snapshot()
+    assert "frames_dropped" not in telemetry.counts()
 
 
 def test_a_frame_tells_when_it_was_captured_on_our_clock(connect, heard):
@@ -285,10 +293,10 @@ def test_a_frame_tells_when_it_was_captured_on_our_clock(connect, heard):
         assert captured_s < frame.t_received_s
 
 
-def test_frames_before_the_version_is_known_are_not_guessed_at(heard, counters):
+def test_frames_before_the_version_is_known_are_not_guessed_at(heard, telemetry):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as motive:
         motive.bind(("127.0.0.1", 0))
-        client = NatNetBodies(heard, counters, *motive.getsockname())
+        client = client_of(heard, telemetry, *motive.getsockname())
         client.start()
         _, address = motive.recvfrom(1_000)
         motive.sendto(packet(7, write((3, 0), 1)), address)
@@ -296,7 +304,7 @@ def test_frames_before_the_version_is_known_are_not_guessed_at(heard, counters):
         motive.sendto(packet(7, write((3, 0), 2)), address)
         assert heard.next().frame == 2
         client.stop()
-    assert counters.snapshot()["frames_dropped"] == {"unsupported": 1}
+    assert telemetry.counts()["frames_dropped"] == {"unsupported": 1}
 
 
 def test_bad_pose_of_one_body_spares_the_others(connect, heard):
@@ -314,10 +322,10 @@ def test_bad_pose_of_one_body_spares_the_others(connect, heard):
         ("127.0.0.1", {"interface": "203.0.113.9"}, "203.0.113.9:0: Cannot assign requested address"),
     ],
 )
-def test_wrong_places_are_named(heard, counters, host, options, says):
+def test_wrong_places_are_named(heard, telemetry, host, options, says):
     with pytest.raises(ListenError, match=says):
-        NatNetBodies(heard, counters, host, **options).start()
+        client_of(heard, telemetry, host, **options).start()
 
 
-def test_stop_without_start(heard, counters):
-    NatNetBodies(heard, counters, "127.0.0.1").stop()
+def test_stop_without_start(heard, telemetry):
+    client_of(heard, telemetry, "127.0.0.1").stop()

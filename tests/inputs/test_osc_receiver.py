@@ -8,6 +8,7 @@ import threading
 import pytest
 from osc_writer import bundle, osc
 
+from manipnet.inputs.osc import OSC
 from manipnet.inputs.osc.receiver import MAX_SENDERS, OscBodies
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import FAULTS_PER_S
@@ -24,8 +25,8 @@ def frame(n, *keys):
 
 
 @pytest.fixture
-def receiver(heard, counters):
-    receiver = OscBodies(heard, counters, port=0)
+def receiver(heard, telemetry):
+    receiver = OscBodies(OSC.intake(heard, telemetry), port=0)
     receiver.start()
     yield receiver
     receiver.stop()
@@ -89,15 +90,15 @@ def test_messages_of_two_senders_are_not_mixed(receiver, heard, sockets):
         bytes(65_000),
     ],
 )
-def test_good_frame_after_garbage(receiver, heard, counters, sockets, garbage):
+def test_good_frame_after_garbage(receiver, heard, telemetry, sockets, garbage):
     udp = sender(sockets, receiver)
     udp.send(garbage)
     udp.send(frame(7, 1))
     assert heard.next().frame == 7
-    assert counters.snapshot()["frames_dropped"] == {"malformed": 1}
+    assert telemetry.counts()["frames_dropped"] == {"malformed": 1}
 
 
-def test_a_stream_passes_through_another_senders_flood(receiver, heard, counters, sockets):
+def test_a_stream_passes_through_another_senders_flood(receiver, heard, telemetry, sockets):
     good, bad = sender(sockets, receiver), sender(sockets, receiver)
     for n in range(200):
         good.send(frame(n, 1))
@@ -106,7 +107,7 @@ def test_a_stream_passes_through_another_senders_flood(receiver, heard, counters
         assert heard.next().frame == n
     good.send(frame(200, 1))
     assert heard.next().frame == 200
-    dropped = counters.snapshot()["frames_dropped"]
+    dropped = telemetry.counts()["frames_dropped"]
     assert dropped["malformed"] >= FAULTS_PER_S
     assert dropped["malformed"] + dropped["rate"] <= 2_000
 
@@ -118,9 +119,9 @@ def test_senders_that_come_and_go_do_not_pile_up(receiver, heard, sockets):
     assert len(receiver._assemblers) == MAX_SENDERS
 
 
-def test_only_listed_addresses_are_heard(heard, counters, sockets):
+def test_only_listed_addresses_are_heard(heard, telemetry, sockets):
     allow = [ipaddress.ip_network("127.0.0.2/32")]
-    receiver = OscBodies(heard, counters, port=0, allow=allow)
+    receiver = OscBodies(OSC.intake(heard, telemetry), port=0, allow=allow)
     receiver.start()
     stranger, friend = sender(sockets, receiver), sender(sockets, receiver)
     stranger.send(frame(1, 1))
@@ -132,23 +133,23 @@ def test_only_listed_addresses_are_heard(heard, counters, sockets):
     friend.send(frame(2, 1))
     assert heard.next().frame == 2
     receiver.stop()
-    assert counters.snapshot()["frames_dropped"] == {"not_allowed": 1}
+    assert telemetry.counts()["frames_dropped"] == {"not_allowed": 1}
 
 
-def test_a_frame_that_lost_its_time_is_counted(receiver, heard, counters, sockets):
+def test_a_frame_that_lost_its_time_is_counted(receiver, heard, telemetry, sockets):
     udp = sender(sockets, receiver)
     udp.send(bundle(osc("/frame/timestamp", 1_000.0), pose(1)))
     udp.send(bundle(pose(1), pose(2)))
     udp.send(bundle(osc("/frame/timestamp", 2_000.0), pose(1)))
     assert [heard.next().t_s for _ in range(2)] == [1.0, 2.0]
-    assert counters.snapshot()["frames_dropped"] == {"incomplete": 1}
+    assert telemetry.counts()["frames_dropped"] == {"incomplete": 1}
 
 
-def test_stop_frees_the_port_and_start_takes_it_again(heard, counters, sockets):
+def test_stop_frees_the_port_and_start_takes_it_again(heard, telemetry, sockets):
     threads = threading.active_count()
     port = 0
     for n in range(3):
-        receiver = OscBodies(heard, counters, port=port)
+        receiver = OscBodies(OSC.intake(heard, telemetry), port=port)
         receiver.start()
         port = int(receiver.address.rpartition(":")[2])
         sender(sockets, receiver).send(frame(n, 1))
@@ -158,20 +159,20 @@ def test_stop_frees_the_port_and_start_takes_it_again(heard, counters, sockets):
     assert threading.active_count() == threads
 
 
-def test_port_in_use_is_named(receiver, heard, counters):
+def test_port_in_use_is_named(receiver, heard, telemetry):
     port = int(receiver.address.rpartition(":")[2])
-    with pytest.raises(ListenError, match=rf"OSC on 127.0.0.1:{port}: Address already in use; choose a free"):
-        OscBodies(heard, counters, port=port).start()
+    with pytest.raises(ListenError, match=rf"udp://127.0.0.1:{port}: Address already in use; choose a port"):
+        OscBodies(OSC.intake(heard, telemetry), port=port).start()
 
 
 @pytest.mark.parametrize("host", ["no-such-host.invalid", "203.0.113.5"])
-def test_wrong_host_is_named(heard, counters, host):
+def test_wrong_host_is_named(heard, telemetry, host):
     with pytest.raises(ListenError, match=host):
-        OscBodies(heard, counters, host=host, port=0).start()
+        OscBodies(OSC.intake(heard, telemetry), host=host, port=0).start()
 
 
-def test_ipv6(heard, counters, sockets):
-    receiver = OscBodies(heard, counters, host="::1", port=0)
+def test_ipv6(heard, telemetry, sockets):
+    receiver = OscBodies(OSC.intake(heard, telemetry), host="::1", port=0)
     receiver.start()
     udp = socket.socket(socket.AF_INET6, socket.SOCK_DGRAM)
     sockets.append(udp)

@@ -9,12 +9,13 @@ import msgpack
 import pytest
 import zmq
 
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net import access_control as access
 from manipnet.net.access_control import AccessControl
 from manipnet.net.connection_limits import MAX_UNDELIVERED_BYTES, SMALL_TALK_BYTES, Connections
 from manipnet.net.zmq_socket import MAX_WIRE_BYTES
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 
 MOST = 3
 MESSAGE = msgpack.packb({"t": 1.0, "bodies": [{"id": 1, "p": [0, 0, 0], "q": [0, 0, 0, 1]}]})
@@ -24,16 +25,16 @@ class Door:
     """A publisher that lets `MOST` in."""
 
     def __init__(self) -> None:
-        self.counters, self.context = Counters(), zmq.Context()
+        self.telemetry, self.context = Telemetry(), zmq.Context()
         self.pub = self.context.socket(zmq.XPUB)  # which tells when a subscription has come
         self.pub.setsockopt(zmq.LINGER, 0)
         self.pub.setsockopt(zmq.XPUB_VERBOSE, 1)
-        self.keeper = AccessControl(self.context, self.pub, self.counters, most=MOST)
+        self.keeper = AccessControl(self.context, self.pub, self.telemetry, most=MOST)
         self.pub.bind("tcp://127.0.0.1:0")
         self.address = self.pub.getsockopt_string(zmq.LAST_ENDPOINT)
 
     def refused(self) -> dict[str, int]:
-        return self.counters.snapshot().get("connections_refused", {})
+        return self.telemetry.counts().get("connections_refused", {})
 
     def close(self) -> None:
         self.pub.close()
@@ -136,8 +137,8 @@ def test_frames_without_end_cost_a_subscriber_its_connection(door):
 
 
 @pytest.mark.skipif(not hasattr(socket, "TCP_INFO"), reason="only Linux tells how much came over a connection")
-def test_frames_without_end_cost_a_sender_its_connection_and_others_nothing(heard, counters):
-    receiver = ZmqBodies(heard, counters, port=0)
+def test_frames_without_end_cost_a_sender_its_connection_and_others_nothing(heard, telemetry):
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0)
     receiver.start()
     frame = b"\x03" + struct.pack(">Q", MAX_WIRE_BYTES) + bytes(MAX_WIRE_BYTES)
     with zmq.Context() as context, context.socket(zmq.XPUB) as good, speak_zmtp(receiver.address, b"PUB") as bad:
@@ -148,7 +149,7 @@ def test_frames_without_end_cost_a_sender_its_connection_and_others_nothing(hear
         good.send(MESSAGE)
         assert heard.next().t_s == 1.0
     receiver.stop()
-    assert counters.snapshot()["connections_refused"] == {"endless": 1}
+    assert telemetry.counts()["connections_refused"] == {"endless": 1}
 
 
 @pytest.fixture

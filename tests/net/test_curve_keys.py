@@ -7,7 +7,8 @@ import msgpack
 import pytest
 import zmq
 
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.curve_keys import (
     ALLOW_FILE,
     SERVER_FILE,
@@ -33,8 +34,8 @@ def folder(tmp_path):
 
 
 @pytest.fixture
-def receiver(folder, heard, counters):
-    receiver = ZmqBodies(heard, counters, port=0, keys=read_server_keys(folder))
+def receiver(folder, heard, telemetry):
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0, keys=read_server_keys(folder))
     receiver.start()
     yield receiver
     receiver.stop()
@@ -67,14 +68,14 @@ def send(publisher):
     publisher.send(MESSAGE)
 
 
-def wait_for_refusal(counters, reason):
+def wait_for_refusal(telemetry, reason):
     """The refused client tries again and again; each try is counted. Waits on its own, bounded, without a clock."""
     with zmq.Context() as context, context.socket(zmq.PAIR) as nothing:
         for _ in range(2_000):
-            if counters.snapshot().get("connections_refused", {}).get(reason):
+            if telemetry.counts().get("connections_refused", {}).get(reason):
                 return
             nothing.poll(10)
-    pytest.fail(f"nothing was counted as {reason}: {counters.snapshot()}")
+    pytest.fail(f"nothing was counted as {reason}: {telemetry.counts()}")
 
 
 def pair():
@@ -96,37 +97,37 @@ def test_a_listed_client_is_heard(folder, connect, heard):
     ],
     ids=["plain", "wrong server key", "not listed"],
 )
-def test_others_are_kept_out_counted_and_harmless(folder, connect, heard, counters, keys, reason):
+def test_others_are_kept_out_counted_and_harmless(folder, connect, heard, telemetry, keys, reason):
     stranger = connect(keys(folder))
-    wait_for_refusal(counters, reason)
+    wait_for_refusal(telemetry, reason)
     assert not stranger.poll(0)
     stranger.send(MESSAGE)
     send(connect(read_client_keys(make_client_keys(folder, "stage-pc"))))
     heard.next()
-    assert counters.snapshot()["frames_in"] == {"zmq": 1}
+    assert telemetry.counts()["frames_in"] == {"zmq": 1}
 
 
-def test_a_client_taken_off_the_list_is_kept_out_from_its_next_connection_on(folder, connect, heard, counters):
+def test_a_client_taken_off_the_list_is_kept_out_from_its_next_connection_on(folder, connect, heard, telemetry):
     keys = read_client_keys(make_client_keys(folder, "stage-pc"))
     send(connect(keys))
     heard.next()
     (folder / ALLOW_FILE).write_text("# nobody\n")
     connect(keys)
-    wait_for_refusal(counters, "not_listed")
+    wait_for_refusal(telemetry, "not_listed")
 
 
-def test_a_list_that_cannot_be_read_lets_nobody_in(folder, connect, heard, counters, caplog):
+def test_a_list_that_cannot_be_read_lets_nobody_in(folder, connect, heard, telemetry, caplog):
     keys = read_client_keys(make_client_keys(folder, "stage-pc"))
     (folder / ALLOW_FILE).write_text("nonsense\n")
     connect(keys)
-    wait_for_refusal(counters, "not_listed")
+    wait_for_refusal(telemetry, "not_listed")
     assert "line 1: no public key" in caplog.text
 
 
-def test_port_in_use_is_named_and_everything_is_closed(folder, receiver, heard, counters):
+def test_port_in_use_is_named_and_everything_is_closed(folder, receiver, heard, telemetry):
     port = int(receiver.address.rpartition(":")[2])
     with pytest.raises(ListenError, match="in use"):
-        ZmqBodies(heard, counters, port=port, keys=read_server_keys(folder)).start()
+        ZmqBodies(ZEROMQ.intake(heard, telemetry), port=port, keys=read_server_keys(folder)).start()
 
 
 # Key files

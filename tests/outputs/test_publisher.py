@@ -8,9 +8,10 @@ import pytest
 import zmq
 from publisher import message
 
-from manipnet.config.settings import ServerConfig, default_actor
+from manipnet.config.settings import ServerConfig
 from manipnet.control.service import Control
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.curve_keys import (
     ClientKeys,
     KeyFileError,
@@ -21,15 +22,22 @@ from manipnet.net.curve_keys import (
 )
 from manipnet.net.curve_keys import read_client_keys as read_keys
 from manipnet.net.zap import secure_client
+from manipnet.outputs import open_outputs
+from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
+from manipnet.outputs.websocket import WebSocketOptions
+from manipnet.outputs.zeromq import ZmqOutputOptions
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet.telemetry import Counters
+from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
 
-HAND = shipped_hand()
-CONFIG = ServerConfig((default_actor(),), port=0, web_port=0)
+CONFIG = ServerConfig((), protocols=(ZmqOutputOptions(port=0), WebSocketOptions(web_port=0)))
 MOST_KEPT_BYTES = 6 << 20
-"""For a client that has stopped: `SEND_HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
+"""For a client that has stopped: `HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
+
+
+def publisher_of(telemetry, keys=None):
+    return Publisher(open_outputs(CONFIG.of, Emission(telemetry, shipped_hand(), keys=keys)), telemetry)
 
 
 @pytest.fixture
@@ -39,13 +47,13 @@ def context():
 
 
 @pytest.fixture
-def counters():
-    return Counters()
+def telemetry():
+    return Telemetry()
 
 
 @pytest.fixture
-def publisher(counters):
-    publisher = Publisher(CONFIG, counters, HAND)
+def publisher(telemetry):
+    publisher = publisher_of(telemetry)
     yield publisher
     publisher.close()
 
@@ -78,6 +86,7 @@ def seq_of(sub):
     return decode_binary(sub.recv()[len(TOPIC_BIN) :]).seq
 
 
+@pytest.mark.slow
 def test_a_subscriber_that_does_not_read_costs_the_others_nothing_and_is_bounded(publisher, context):
     with ExitStack() as opened:
         readers = [opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_BIN)) for _ in range(2)]
@@ -110,9 +119,9 @@ def test_a_list_that_cannot_be_read_is_named_and_leaves_nothing_open(tmp_path):
     keys.allow_file.unlink()
     threads = threading.active_count()
     for start in (
-        lambda: Publisher(CONFIG, Counters(), HAND, keys),
-        lambda: Control("127.0.0.1", 0, {}, Counters(), keys),
-        ZmqBodies(print, Counters(), port=0, keys=keys).start,
+        lambda: publisher_of(Telemetry(), keys),
+        lambda: Control("127.0.0.1", 0, {}, Telemetry(), keys),
+        ZmqBodies(ZEROMQ.intake(print, Telemetry()), port=0, keys=keys).start,
     ):
         with pytest.raises(KeyFileError, match=r"cannot read .*clients\.allow"):
             start()
@@ -130,11 +139,11 @@ STRANGERS = {
 def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, tmp_path, keys, reason):
     make_server_keys(tmp_path)
     server, friend = read_server_keys(tmp_path), read_keys(make_client_keys(tmp_path, "stage-pc"))
-    frames, hands, bodies, control = [], Counters(), Counters(), Counters()
+    frames, hands, bodies, control = [], Telemetry(), Telemetry(), Telemetry()
     with ExitStack() as opened:
-        publisher = Publisher(CONFIG, hands, HAND, server)
+        publisher = publisher_of(hands, server)
         opened.callback(publisher.close)
-        receiver = ZmqBodies(frames.append, bodies, port=0, keys=server)
+        receiver = ZmqBodies(ZEROMQ.intake(frames.append, bodies), port=0, keys=server)
         receiver.start()
         opened.callback(receiver.stop)
         asked = Control("127.0.0.1", 0, {"ping": lambda request: {"t": 0.0}}, control, server)
@@ -152,16 +161,16 @@ def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, t
         asking.send(b'{"op": "ping"}')
         good = opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_MSGPACK, friend))
         seq = publish_until_heard(publisher, [good])
-        for counters in (hands, bodies, control):
+        for telemetry in (hands, bodies, control):
             for _ in range(2_000):
-                if counters.snapshot().get("connections_refused", {}).get(reason):
+                if telemetry.counts().get("connections_refused", {}).get(reason):
                     break
                 good.poll(10)
                 seq += 1
                 publisher.publish(message(seq, seq / 60, 0.1))
-            assert counters.snapshot()["connections_refused"][reason] >= 1
+            assert telemetry.counts()["connections_refused"][reason] >= 1
         assert not watching.poll(0)
         assert not sending.poll(0), "the server subscribes to a stranger"
         assert not asking.poll(0)
-    assert "control_requests" not in control.snapshot()
+    assert "control_requests" not in control.counts()
     assert frames == []

@@ -23,7 +23,7 @@ from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
 from manipnet.synthesis.synthesizer import Synthesizer
-from manipnet.telemetry import Counters, StageClock, Timings
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 HAND = shipped_hand()
@@ -44,19 +44,19 @@ class TickObserver:
     def __init__(self) -> None:
         self.frames: list[Frame] = []
 
-    def see(self, actor, tick, _, steps, message) -> None:
-        self.frames.append(frame_of(actor, tick, steps, message))
+    def see(self, actor, plan, message) -> None:
+        self.frames.append(frame_of(actor, plan.tick, plan.steps, message))
 
 
 @pytest.fixture(scope="module")
 def frames(prop: Prop, tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> list[Frame]:
     """Half a second of two moving hands of another size than the model's, on a box of another size than its mesh."""
-    bundle, counters, timings = load_bundle(tiny_bundle), Counters(), Timings()
-    actor = Actor(replace(default_actor(), hand_scale=HAND_SIZE), [prop], bundle, counters, 0.1)
+    bundle, telemetry = load_bundle(tiny_bundle), Telemetry()
+    actor = Actor(replace(default_actor(), hand_scale=HAND_SIZE), [prop], bundle, telemetry, 0.1)
     actor.carry(prop.name, prop.object, prop.shape, prop.scale)
-    observer, mailbox = TickObserver(), Mailbox(counters)
+    observer, mailbox = TickObserver(), Mailbox(telemetry)
     recorder = FlightRecorder(tmp_path_factory.mktemp("dumps"))
-    rest = StageClock(timings), lambda message: None, mailbox, recorder, counters, timings, observer
+    rest = lambda message: None, mailbox, recorder, telemetry, observer
     loop = TickLoop("session", [actor], Synthesizer(bundle), *rest)
     for k in range(180):
         bodies = (BodySample(None, str(n), tuple(p[:3]), tuple(p[3:]), True) for n, p in scene(k / 120).items() if p)

@@ -11,7 +11,7 @@ from zmq.utils.monitor import parse_monitor_message
 from manipnet.net.connection_limits import Connections
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.zap import ZAP_ADDRESS, ClientList, secure_server
-from manipnet.telemetry import Counters
+from manipnet.telemetry import LogThrottle, Telemetry
 
 MOST_CONNECTIONS: Final = 64
 HANDSHAKE_MS: Final = 5_000
@@ -41,15 +41,15 @@ class AccessControl:
         self,
         context: zmq.Context,
         socket: zmq.Socket,
-        counters: Counters,
+        telemetry: Telemetry,
         keys: ServerKeys | None = None,
         most: int = MOST_CONNECTIONS,
     ) -> None:
         """Call before `socket` is bound. Raises `KeyFileError` for a list that cannot be read."""
-        self._counters = counters
+        self._telemetry = telemetry
         self._clients = None if keys is None else ClientList(keys)
         self.connections = Connections(most, self._refuse)
-        self._logged_s: dict[str, float] = {}
+        self._log_throttle = LogThrottle(_LOG_PERIOD_S)
         self._shaking, self._accepted_s = 0, float("-inf")
         """Connections whose handshake has come to no end that is known, and when the newest was accepted."""
         self._zap: zmq.Socket | None = None
@@ -121,8 +121,6 @@ class AccessControl:
             self._refuse("not_listed")
 
     def _refuse(self, reason: str) -> None:
-        self._counters.add("connections_refused", reason=reason)
-        now_s = time.monotonic()
-        if now_s - self._logged_s.get(reason, float("-inf")) >= _LOG_PERIOD_S:
-            self._logged_s[reason] = now_s
+        self._telemetry.count("connections_refused", reason=reason)
+        if self._log_throttle.admit(reason) is not None:
             _log.warning("kept out (%s) %s", reason, _REFUSED[reason])

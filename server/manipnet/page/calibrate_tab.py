@@ -1,14 +1,12 @@
 """The tab in which hands are calibrated: what to show, where the sheet lies, and how good it was."""
 
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import viser
 
-if TYPE_CHECKING:
-    from manipnet.page.app import Page
+from manipnet.page.controls import Ask, Perform
 
 COUNTDOWN_S: Final = 3
 """From the click to the request, which looks back 2 s: the hand that clicked must lie still by then."""
@@ -28,14 +26,13 @@ STEPS: Final = {
     ),
 }
 """What is shown in each step, and what its button says."""
-Doing = Callable[[Callable[[], str | None]], None]
 
 
 class CalibrateTab:
     """Both steps of docs/calibration.md, each asked for a little after the click."""
 
-    def __init__(self, page: "Page", gui: viser.GuiApi, doing: Doing) -> None:
-        self._page = page
+    def __init__(self, ask: Ask, gui: viser.GuiApi, perform: Perform) -> None:
+        self._ask = ask
         self._props: dict[str, tuple[str, ...]] = {}
         """By actor."""
         self._whose: viser.GuiDropdownHandle[str] = gui.add_dropdown("Whose", NOBODY, visible=False)  # pyright: ignore
@@ -48,7 +45,7 @@ class CalibrateTab:
         for step, (text, label, icon) in STEPS.items():
             gui.add_markdown(f"{text}\n\n![{label}]({step}.png)", image_root=Path(__file__).parent)
             button = gui.add_button(label, icon=icon, hint=f"then keep still for {COUNTDOWN_S} s")
-            button.on_click(lambda _, step=step, button=button: doing(lambda: self._calibrate(step, button)))
+            button.on_click(lambda _, step=step, button=button: perform(lambda: self._calibrate(step, button)))
         self._told = gui.add_markdown("")
 
     def refresh(self, bodies: dict[str, dict[str, Any]]) -> None:
@@ -70,7 +67,7 @@ class CalibrateTab:
             for left in range(COUNTDOWN_S, 0, -1):
                 button.label = f"Keep still … {left}"
                 time.sleep(1.0)
-            self._told.content = report(self._page.link.ask(**request))
+            self._told.content = report(self._ask(**request))
         finally:
             button.label, button.disabled = label, False
 

@@ -1,31 +1,28 @@
 """The tab in which props are chosen, sized, placed and brought in."""
 
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 import viser
 
 from manipnet.config.settings import SCALE_RANGE
 from manipnet.geometry import Array, quat_exp, quat_log
+from manipnet.page.controls import Ask, Perform, by_visitor
 from manipnet.page.frames import Frame
 from manipnet.page.gizmo import Gizmo
-from manipnet.synthesis.objects.mesh import FORMATS, UNITS_M
-
-if TYPE_CHECKING:
-    from manipnet.page.app import Page
+from manipnet.synthesis.objects.mesh import FORMATS
+from manipnet.synthesis.objects.units import UNITS_M
 
 NONES: Final[tuple[str, ...]] = ("none",)
-Doing = Callable[[Callable[[], str | None]], None]
 
 
 class ObjectsTab:
     """Which body carries what, how large, and where on it."""
 
-    def __init__(self, page: "Page", client: viser.ClientHandle, doing: Doing) -> None:
-        self._page, self._doing, gui = page, doing, client.gui
+    def __init__(self, ask: Ask, client: viser.ClientHandle, perform: Perform) -> None:
+        self._ask, self._perform, gui = ask, perform, client.gui
         self._handles = Gizmo(client.scene, self._drag)
         self._carried: dict[str, dict[str, Any]] = {}
         self._shown: dict[str, Any] | None = None
@@ -46,13 +43,13 @@ class ObjectsTab:
             "Bring in a mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
         )
         self._problems = gui.add_markdown("")
-        self._stand.on_click(lambda _: self._doing(self._stand_on_sheet))
-        self._body.on_update(self._by_visitor(self._show_body))
+        self._stand.on_click(lambda _: self._perform(self._stand_on_sheet))
+        self._body.on_update(by_visitor(self._show_body))
         for handle in (self._object, self._scale):
-            handle.on_update(self._by_visitor(lambda: self._doing(self._select)))
+            handle.on_update(by_visitor(lambda: self._perform(self._select)))
         for handle in (self._position, self._turn):
-            handle.on_update(self._by_visitor(lambda: self._doing(self._place)))
-        self._upload.on_upload(lambda _: self._doing(self._bring_in))
+            handle.on_update(by_visitor(lambda: self._perform(self._place)))
+        self._upload.on_upload(lambda _: self._perform(self._bring_in))
 
     def refresh(self, answer: dict[str, Any]) -> None:
         """Offer what there is now, as the server told it."""
@@ -101,21 +98,21 @@ class ObjectsTab:
         return {"actor": prop["actor"], "body": prop["body"]}
 
     def _select(self) -> None:
-        self._page.link.ask(op="select_object", object=self._object.value, scale=self._scale.value, **self._chosen())
+        self._ask(op="select_object", object=self._object.value, scale=self._scale.value, **self._chosen())
 
     def _place(self) -> None:
         rotation = quat_exp(np.radians(self._turn.value))
         self._put(np.concatenate([1e-3 * np.array(self._position.value), rotation]))
 
     def _drag(self, offset: Array, last: bool) -> None:
-        self._doing(lambda: self._put(offset, last))
+        self._perform(lambda: self._put(offset, last))
 
     def _put(self, offset: Array, store: bool = True) -> None:
         place = {"position": offset[:3].tolist(), "rotation": offset[3:].tolist(), "store": store}
-        self._page.link.ask(op="place_object", **place, **self._chosen())
+        self._ask(op="place_object", **place, **self._chosen())
 
     def _stand_on_sheet(self) -> None:
-        self._page.link.ask(op="place_object", on_sheet=True, **self._chosen())
+        self._ask(op="place_object", on_sheet=True, **self._chosen())
 
     def _bring_in(self) -> str:
         file = self._upload.value
@@ -127,15 +124,6 @@ class ObjectsTab:
         with tempfile.TemporaryDirectory(prefix="manipnet-") as folder:
             path = Path(folder) / Path(name).name
             path.write_bytes(content)
-            added = self._page.link.ask(op="add_object", file=str(path), unit=self._unit.value)
-        self._page.link.ask(op="select_object", object=added["object"], scale=1.0, **chosen)
+            added = self._ask(op="add_object", file=str(path), unit=self._unit.value)
+        self._ask(op="select_object", object=added["object"], scale=1.0, **chosen)
         return f"{chosen['body']} carries {added['object']}"
-
-    def _by_visitor(self, action: Callable[[], None]) -> Callable[[viser.GuiEvent[Any]], None]:
-        """Only what a visitor did, not what is set here."""
-
-        def changed(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                action()
-
-        return changed

@@ -1,21 +1,19 @@
 """The panel of one visitor: how things stand for everybody, controls for those who may."""
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import viser
 
 from manipnet.page.calibrate_tab import CalibrateTab
 from manipnet.page.charts import History, Plots
+from manipnet.page.controls import Action, Ask, by_visitor
 from manipnet.page.frames import Frame
 from manipnet.page.objects_tab import ObjectsTab
 from manipnet.page.overlays import OVERLAYS
 from manipnet.page.rpc import RefusedError
+from manipnet.page.show import Show
 from manipnet.page.takes_tab import TakesTab
-
-if TYPE_CHECKING:
-    from manipnet.page.app import Page
 
 DOTS = {"live": "●", "hold": "◐", "rest": "○"}
 NOTE_S = 6.0
@@ -24,8 +22,8 @@ NOTE_S = 6.0
 class Panel:
     """Built when a visitor comes. An operator sits on this machine; others only look."""
 
-    def __init__(self, page: "Page", client: viser.ClientHandle, operator: bool) -> None:
-        self._page, self._client = page, client
+    def __init__(self, ask: Ask, show: Show, client: viser.ClientHandle, operator: bool) -> None:
+        self._ask, self._show, self._client = ask, show, client
         self.objects: ObjectsTab | None = None
         self._takes: TakesTab | None = None
         self._calibration: CalibrateTab | None = None
@@ -39,11 +37,11 @@ class Panel:
             with tabs.add_tab("Scene"):
                 self._scene(gui)
             with tabs.add_tab("Objects"):
-                self.objects = ObjectsTab(page, client, self.doing)
+                self.objects = ObjectsTab(ask, client, self.perform)
             with tabs.add_tab("Takes"):
-                self._takes = TakesTab(page, gui, self.doing)
+                self._takes = TakesTab(ask, show, gui, self.perform)
             with tabs.add_tab("Calibrate"):
-                self._calibration = CalibrateTab(page, gui, self.doing)
+                self._calibration = CalibrateTab(ask, gui, self.perform)
         side = gui.add_panel()
         with side.add_tab("Health", viser.Icon.HEARTBEAT):
             self._health = gui.add_markdown("")
@@ -58,14 +56,14 @@ class Panel:
             self._headline.content = f"**the server does not answer:** {error}"
 
     def _refresh(self) -> None:
-        history = next(iter(self._page.histories.values()), None) or History()
-        status = self._page.link.ask(op="status")
-        self._headline.content = _headline(self._page, status, history)
+        history = next(iter(self._show.histories.values()), None) or History()
+        status = self._ask(op="status")
+        self._headline.content = _headline(self._show, status, history)
         self._health.content = _health(status)
         self._plots.show(history)
         if self.objects is not None and self._takes is not None and self._calibration is not None:
             self._show_paused(_paused(status))
-            answer = self._page.link.ask(op="objects")
+            answer = self._ask(op="objects")
             self.objects.refresh(answer)
             self._calibration.refresh(answer["bodies"])
             self._takes.refresh()
@@ -75,8 +73,8 @@ class Panel:
         if self.objects is not None:
             self.objects.follow(frame)
 
-    def doing(self, action: Callable[[], str | None]) -> None:
-        """Do what the visitor asked for, and tell how it went where there is anything to tell."""
+    def perform(self, action: Action) -> None:
+        """Run an action and notify the visitor of its message or its error."""
         try:
             text = action()
         except (RefusedError, ValueError, OSError) as error:
@@ -91,27 +89,19 @@ class Panel:
             "Rest", icon=viser.Icon.HAND_STOP, hint="ease the hands to their rest pose, to begin anew"
         )
         self._on_click(self._pause, self._toggle_pause)
-        self._on_click(rest, self._ask(op="rest"))
+        self._on_click(rest, self._asking(op="rest"))
 
     def _scene(self, gui: viser.GuiApi) -> None:
         slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
-        slider.on_update(lambda event: self._change_look_ahead(event, slider))
-        self._look_ahead = slider
+        slider.on_update(by_visitor(lambda: self.perform(self._asking(op="look_ahead", seconds=1e-3 * slider.value))))
         for name, label in OVERLAYS.items():
-            box = gui.add_checkbox(label, name in self._page.layers)
-            box.on_update(lambda event, name=name: self._toggle(name, event.target.value))
+            box = gui.add_checkbox(label, name in self._show.overlays)
+            box.on_update(lambda event, name=name: self._show.set_overlay(name, event.target.value))
         center = gui.add_button("Center the view", icon=viser.Icon.FOCUS_2)
-        self._on_click(center, self._page.recenter)
-
-    def _toggle(self, layer: str, shown: bool) -> None:
-        self._page.layers = self._page.layers | {layer} if shown else self._page.layers - {layer}
-
-    def _change_look_ahead(self, event: viser.GuiEvent[Any], slider: viser.GuiSliderHandle[int]) -> None:
-        if event.client is not None:  # not what we set ourselves
-            self.doing(self._ask(op="look_ahead", seconds=1e-3 * slider.value))
+        self._on_click(center, self._show.recenter)
 
     def _toggle_pause(self) -> None:
-        self._page.link.ask(op="pause", on=not self._paused)
+        self._ask(op="pause", on=not self._paused)
 
     def _show_paused(self, paused: bool) -> None:
         if paused != self._paused:
@@ -119,24 +109,24 @@ class Panel:
             self._pause.label = "Go on" if paused else "Pause"
             self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
 
-    def _ask(self, **request: Any) -> Callable[[], None]:
+    def _asking(self, **request: Any) -> Action:
         def ask() -> None:
-            self._page.link.ask(**request)
+            self._ask(**request)
 
         return ask
 
-    def _on_click(self, button: viser.GuiButtonHandle, action: Callable[[], str | None]) -> None:
-        button.on_click(lambda _: self.doing(action))
+    def _on_click(self, button: viser.GuiButtonHandle, action: Action) -> None:
+        button.on_click(lambda _: self.perform(action))
 
 
-def _headline(page: "Page", status: dict[str, Any], history: History) -> str:
-    frames = page.live.values()
+def _headline(show: Show, status: dict[str, Any], history: History) -> str:
+    frames = show.live.values()
     if not frames:
         return "○ **Waiting for bodies**: `manipnet doctor` says why nothing arrives"
     latency = next(iter(frames)).message.latency_ms
     what = "◐ **Paused**" if _paused(status) else "● **Live**"
-    if page.recording is not None:
-        what = f"▶ **{page.recording.name}**"
+    if show.recording is not None:
+        what = f"▶ **{show.recording.name}**"
     waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms work"
     return f"{what} · {history.rate_hz:.0f} hands/s\n\n{waits}"
 

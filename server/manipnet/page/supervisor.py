@@ -7,7 +7,6 @@ browser's own reconnecting starts another.
 
 import contextlib
 import logging
-import multiprocessing
 import selectors
 import socket
 import threading
@@ -17,16 +16,18 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Final
 
-from manipnet.actors.actor import Actor, Plan
+from manipnet.actors.actor import Actor
+from manipnet.actors.plan import Plan
 from manipnet.actors.props import Prop
 from manipnet.geometry import Array
 from manipnet.net.errors import ListenError
 from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.page.serialization import pack, unpack
+from manipnet.runtime.child_process import ChildProcess
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandStep, Side
-from manipnet.telemetry import Counters
-from manipnet.tracking.timeline import Tick
+from manipnet.telemetry import Telemetry
+from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
 
 FRAMES_HZ: Final = 30.0
@@ -45,12 +46,12 @@ Answer = Callable[[list[bytes]], bytes]
 class LivePage:
     """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, answer: Answer, counters: Counters, hand_file: Path) -> None:
+    def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry, hand_file: Path) -> None:
         """Raises `ListenError`. `answer` meets the page's requests, as it does any client's; `hand_file` describes the
         hand that is shown."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._answer, self._counters, self._hand_file = answer, counters, hand_file
+        self._answer, self._telemetry, self._hand_file = answer, telemetry, hand_file
         self.watched = False
         """Whether a browser is open: only then is there anything to `see`."""
         self._news, self._telling = threading.Condition(), threading.Lock()
@@ -63,14 +64,12 @@ class LivePage:
         """Begin to serve."""
         self._thread.start()
 
-    def see(
-        self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
-    ) -> None:
+    def see(self, actor: Actor, plan: Plan, message: HandsMessage) -> None:
         """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
-        frame = frame_of(actor, tick, steps, message)
+        frame = frame_of(actor, plan.tick, plan.steps, message)
         with self._news:
             if message.actor in self._newest:
-                self._counters.add("page_frames", fate="skipped")
+                self._telemetry.count("page_frames", fate="skipped")
             self._newest[message.actor] = frame, [prop.shape for prop in actor.props]
             self._news.notify()
 
@@ -93,7 +92,7 @@ class LivePage:
                 _log.error("the page: %s: %s", type(error).__name__, error)
             if self._stopping.is_set():
                 return
-            self._counters.add("page_ended", reason="crash")
+            self._telemetry.count("page_ended", reason="crash")
             _log.error("the page's process has ended; the session goes on, and a visit starts the page again")
             pause_s = RESTART_S[0] if time.monotonic() - begin_s > LASTED_S else min(2.0 * pause_s, RESTART_S[1])
             self._stopping.wait(pause_s)
@@ -108,27 +107,19 @@ class LivePage:
 
     def _serve(self) -> None:
         """One life of the page's process."""
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(
-            target=_page, args=(self._listener, theirs, self._hand_file), name="page", daemon=True
-        )
-        process.start()
-        theirs.close()
+        child = ChildProcess("page", _page, self._listener, self._hand_file)
+        ours = child.connection
         sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
         try:
             sender.start()
             self._listen_to(ours)
         finally:
             self.watched = False
-            ours.close()
+            child.close(STOP_S)
+            child.kill()
             with self._news:
                 self._newest.clear()
                 self._news.notify()
-            process.join(STOP_S)
-            if process.is_alive():
-                process.kill()
-                process.join()
             sender.join()
 
     def _listen_to(self, ours: Connection) -> None:
@@ -165,7 +156,7 @@ class LivePage:
                         view = ShapeView(shape.name, shape.content_hash, mesh.vertices, mesh.faces)
                         self._tell(ours, "shape", view)
                 self._tell(ours, "frame", frame)
-                self._counters.add("page_frames", fate="shown")
+                self._telemetry.count("page_frames", fate="shown")
             time.sleep(max(begin_s + 1.0 / FRAMES_HZ - time.monotonic(), 0.0))
 
     def _tell(self, ours: Connection, what: str, content: Any) -> None:
@@ -189,7 +180,7 @@ def _prop(prop: Prop, offset: Array) -> PropView:
     return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
 
 
-def _page(listener: socket.socket, connection: Connection, hand_file: Path) -> None:
+def _page(connection: Connection, listener: socket.socket, hand_file: Path) -> None:
     from manipnet.page.app import serve  # what it needs is of no use to the server itself
 
     serve(listener, connection, hand_file)

@@ -2,27 +2,24 @@
 
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import viser
 
+from manipnet.page.controls import Ask, Perform, by_visitor
 from manipnet.page.playback import read_recording
-
-if TYPE_CHECKING:
-    from manipnet.page.app import Page
+from manipnet.page.show import Show
 
 PLAY_HZ: Final = 30.0
 NONE: Final[str] = "none"
-Doing = Callable[[Callable[[], str | None]], None]
 
 
 class TakesTab:
     """Record and stop; show a recording at any instant; back to what is live."""
 
-    def __init__(self, page: "Page", gui: viser.GuiApi, doing: Doing) -> None:
-        self._page, self._doing = page, doing
+    def __init__(self, ask: Ask, show: Show, gui: viser.GuiApi, perform: Perform) -> None:
+        self._ask, self._show = ask, show
         self._folder, self._recording = Path(), False
         self._playing = threading.Event()
         self._record = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color="red")
@@ -33,15 +30,15 @@ class TakesTab:
         self._scrub = gui.add_slider("Second", 0.0, 1.0, 0.01, initial_value=0.0, visible=False)
         self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY, visible=False)
         self._live = gui.add_button("Back to live", icon=viser.Icon.BROADCAST, visible=False)
-        self._record.on_click(lambda _: doing(self._toggle_record))
-        self._open.on_click(lambda _: doing(self._show_take))
-        self._play.on_click(lambda _: doing(self._toggle_play))
-        self._live.on_click(lambda _: doing(self._back))
-        self._scrub.on_update(self._scrubbed)
+        self._record.on_click(lambda _: perform(self._toggle_record))
+        self._open.on_click(lambda _: perform(self._show_take))
+        self._play.on_click(lambda _: perform(self._toggle_play))
+        self._live.on_click(lambda _: perform(self._back))
+        self._scrub.on_update(by_visitor(lambda: show.seek(self._scrub.value)))
 
     def refresh(self) -> None:
         """Offer what there is now."""
-        answer = self._page.link.ask(op="recordings")
+        answer = self._ask(op="recordings")
         self._folder = Path(answer["folder"])
         takes = tuple(answer["recordings"]) or (NONE,)
         if self._take.options != takes:
@@ -55,9 +52,9 @@ class TakesTab:
 
     def _toggle_record(self) -> str | None:
         if not self._recording:
-            self._page.link.ask(op="record")
+            self._ask(op="record")
             return None
-        answer = self._page.link.ask(op="stop_recording")
+        answer = self._ask(op="stop_recording")
         return f"{answer['name']}: {answer['hands']} hands messages, {answer['bodies']} frames of bodies"
 
     def _show_take(self) -> None:
@@ -65,13 +62,13 @@ class TakesTab:
             raise ValueError("there is no recording yet; press Record")
         recording = read_recording(self._folder / self._take.value)
         self._hold()
-        self._page.play(recording)
+        self._show.play(recording)
         self._scrub.max, self._scrub.value = max(round(recording.seconds, 2), 0.01), 0.0
         self._scrub.visible = self._play.visible = self._live.visible = True
 
     def _back(self) -> None:
         self._hold()
-        self._page.play(None)
+        self._show.play(None)
         self._scrub.visible = self._play.visible = self._live.visible = False
 
     def _toggle_play(self) -> None:
@@ -90,14 +87,5 @@ class TakesTab:
         """Play from where the slider is, over and over."""
         while self._playing.is_set():
             self._scrub.value = (self._scrub.value + 1.0 / PLAY_HZ) % self._scrub.max
-            self._show(self._scrub.value)
+            self._show.seek(self._scrub.value)
             time.sleep(1.0 / PLAY_HZ)
-
-    def _scrubbed(self, event: viser.GuiEvent[Any]) -> None:
-        if event.client is not None:
-            self._show(self._scrub.value)
-
-    def _show(self, second: float) -> None:
-        recording = self._page.recording
-        if recording is not None:
-            self._page.show(recording.at(second), recording.shapes)

@@ -16,9 +16,9 @@ from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer
-from manipnet.telemetry import Counters, Timings
+from manipnet.telemetry import StageClock, Telemetry, Timings
 from manipnet.wire import HandsMessage, encode_binary, encode_msgpack
 from manipnet_tools.bench.scenarios import Scenario, actor_config, actor_names, endless
 
@@ -31,13 +31,12 @@ TICK = STAGES[:-1]
 """The stages of a tick: all but the encoding for clients."""
 
 
-class Stopwatch:
+class Stopwatch(StageClock):
     """Takes the place of the server's stage clock: seconds of every stage of the newest tick."""
 
     def __init__(self) -> None:
+        super().__init__(Timings())
         self.spent_s: dict[str, float] = {}
-        self.last_ms: dict[str, float] = {}
-        self._since_s = 0.0
 
     def start(self) -> None:
         """A tick begins."""
@@ -73,22 +72,21 @@ class Rig:
         self.synthesizer = Observed(bundle, on_stage=self.watch.ended)
         self._frames = endless(performance, actors)
         self._now_s = 0.0
-        counters, timings = Counters(), Timings()
-        self._mailbox = Mailbox(counters)
+        telemetry = Telemetry()
+        telemetry.stages = self.watch
+        self._mailbox = Mailbox(telemetry)
         props = [Prop(name, shape.name, shape) for name, shape in performance.shapes.items()]
         self._loop = TickLoop(
             "bench",
             [
-                Actor(actor_config(performance, name, actors), props, bundle, counters, MAX_LOOK_AHEAD_S)
+                Actor(actor_config(performance, name, actors), props, bundle, telemetry, MAX_LOOK_AHEAD_S)
                 for name in actor_names(actors)
             ],
             self.synthesizer,
-            self.watch,  # pyright: ignore[reportArgumentType]: what the loop asks of a stage clock
             self._publish,
             self._mailbox,
             FlightRecorder(Path(tempfile.gettempdir())),
-            counters,
-            timings,
+            telemetry,
         )
         for _ in range(WARM_UP_TICKS):
             self.tick()

@@ -11,9 +11,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 
-MAX_LOOK_AHEAD_S: Final = 0.5
-WINDOW_OFFSETS_S: Final = np.linspace(-0.5, 0.5, 21)
+WINDOW_OFFSETS_S: Final = np.linspace(-MAX_LOOK_AHEAD_S, MAX_LOOK_AHEAD_S, 21)
 """Trajectory samples about the present tick."""
 WINDOW: Final = len(WINDOW_OFFSETS_S)
 WINDOW_STEP_S: Final = 0.05
