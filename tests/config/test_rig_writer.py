@@ -239,7 +239,10 @@ def test_line_ends_and_permissions_stay(tmp_path: Path) -> None:
     [
         (lambda path: path.unlink(), "No such file"),
         (lambda path: path.write_text("[bodies\n"), "could not be changed"),
-        (lambda path: path.write_text('[[actors]]\nname = "x"\nbodies.left_wrist = 1\n'), "no actor 'actor' any more"),
+        (
+            lambda path: path.write_text('[[actors]]\nname = "x"\nbodies.left_wrist = 1\n'),
+            "no longer has an actor 'actor'",
+        ),
         (
             lambda path: path.write_text('[bodies]\nleft_wrist = 1\nright_wrist = 2\n[[objects]]\nbody = "B"\n'),
             "object",

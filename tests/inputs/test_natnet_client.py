@@ -199,8 +199,8 @@ def test_multicast(connect, heard):
     ("options", "info", "says"),
     [
         ({}, server_info(group="239.255.42.99"), "start with --multicast, or choose Unicast"),
-        ({}, server_info(version=(2, 9)), "speaks NatNet 2.9; 3.0"),
-        ({}, server_info(version=(5, 1)), "speaks NatNet 5.1; 3.0"),
+        ({}, server_info(version=(2, 9)), "speaks NatNet 2.9, and this program understands 3.0"),
+        ({}, server_info(version=(5, 1)), "speaks NatNet 5.1, and this program understands 3.0"),
         ({"multicast": True}, server_info(group="10.0.0.1"), "cannot join multicast 10.0.0.1:1511"),
     ],
 )

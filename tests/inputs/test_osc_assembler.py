@@ -130,7 +130,7 @@ def test_other_peoples_messages_are_passed_over(datagram):
 @pytest.mark.parametrize(
     ("datagram", "says"),
     [
-        (body(7, "position", 1.0, 2.0), "2 arguments; 3 numbers"),
+        (body(7, "position", 1.0, 2.0), "2 arguments; it must have 3 numbers"),
         (body(7, "quat", 1.0, 2.0, 3.0, "w"), "4 numbers"),
         (osc("/VMC/Ext/Tra/Pos", *P, *Q), "must be a name or an integer"),
         (osc("/VMC/Ext/Tra/Pos"), "no arguments"),

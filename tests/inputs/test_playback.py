@@ -120,11 +120,11 @@ def test_names_that_no_address_can_carry() -> None:
         osc_datagrams(BodyFrame(0.0, 0, (body,), 0.0, "test"))
 
 
-def test_nobody_listens(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_receives(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("manipnet.inputs.playback.CONNECT_S", 0.2)
     receiving = Receiving("tcp")
     receiving.receiver.stop()
-    with pytest.raises(PlayError, match="nobody listens for bodies at tcp://127"):
+    with pytest.raises(PlayError, match="nothing receives bodies at tcp://127"):
         replay.connect(receiving.url)
     with pytest.raises(PlayError, match="nowhere"):
         OscBodySender("nowhere.invalid", 39540)

@@ -121,7 +121,7 @@ def test_a_list_that_cannot_be_read_lets_nobody_in(folder, connect, heard, telem
     (folder / ALLOW_FILE).write_text("nonsense\n")
     connect(keys)
     wait_for_refusal(telemetry, "not_listed")
-    assert "line 1: no public key" in caplog.text
+    assert "clients.allow:1: the line must be `public-key name`" in caplog.text
 
 
 def test_port_in_use_is_named_and_everything_is_closed(folder, receiver, heard, telemetry):
@@ -150,16 +150,16 @@ def test_secrets_can_be_read_by_their_owner_only(folder):
 
 
 def test_keys_are_never_replaced(folder):
-    with pytest.raises(KeyFileError, match="exists already"):
+    with pytest.raises(KeyFileError, match="already exists"):
         make_server_keys(folder)
     make_client_keys(folder, "a")
-    with pytest.raises(KeyFileError, match="exists already"):
+    with pytest.raises(KeyFileError, match="already exists"):
         make_client_keys(folder, "a")
 
 
 @pytest.mark.parametrize("name", ["", "server", "../up", "a b", "x" * 65, ".hidden", "a\n"])
 def test_wrong_client_names_are_refused(folder, name):
-    with pytest.raises(KeyFileError, match="is no client name"):
+    with pytest.raises(KeyFileError, match="cannot be the name of a client"):
         make_client_keys(folder, name)
 
 
@@ -175,9 +175,9 @@ def test_missing_files_say_how_to_make_them(tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (b"", "no 'public'"),
+        (b"", "no key 'public'"),
         (b"\xff\xfe", "cannot read"),
-        (b"public = 3", "no 'public'"),
+        (b"public = 3", "no key 'public'"),
         (b"public = [", "cannot read"),
         (b'public = "short"', "40 Z85"),
     ],
@@ -191,5 +191,5 @@ def test_wrong_key_files_are_named(folder, text, says):
 @pytest.mark.parametrize("line", ["short name", "é" * 40, "'" * 40 + " name"])
 def test_wrong_lines_of_the_list_are_named(folder, line):
     (folder / ALLOW_FILE).write_text("# comment\n\n" + line + "\n", encoding="utf-8")
-    with pytest.raises(KeyFileError, match=r"line 3|cannot read"):
+    with pytest.raises(KeyFileError, match=r"allow:3: the line must be|cannot read"):
         read_allow_list(folder / ALLOW_FILE)

@@ -1,6 +1,6 @@
 """The guard against floods, with a clock that is stepped by hand."""
 
-from manipnet.net.rate_limit import FAULTS_PER_S, MAX_SOURCES, STRANGERS_PER_S, SourceRateLimiter, Throttle
+from manipnet.net.rate_limit import FAULTS_PER_S, MAX_SOURCES, UNKNOWN_PER_S, SourceRateLimiter, Throttle
 
 
 def test_a_known_source_passes_through_any_flood():
@@ -8,7 +8,7 @@ def test_a_known_source_passes_through_any_flood():
     assert guard.admits("good", 0.0)
     guard.good("good")
     admitted = sum(guard.admits(f"stranger {n}", 0.5) for n in range(50_000))
-    assert admitted == STRANGERS_PER_S - 1
+    assert admitted == UNKNOWN_PER_S - 1
     assert guard.admits("good", 0.5)
 
 
@@ -38,7 +38,7 @@ def test_a_known_source_that_turns_bad_is_a_stranger_again():
     assert not guard.admits("relay", 0.0)
     assert guard.admits("relay", 1.5)
     guard.good("relay")
-    assert all(guard.admits("relay", 1.6) for _ in range(2 * STRANGERS_PER_S))
+    assert all(guard.admits("relay", 1.6) for _ in range(2 * UNKNOWN_PER_S))
 
 
 def test_an_occasional_fault_is_forgiven():

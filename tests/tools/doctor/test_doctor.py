@@ -189,7 +189,7 @@ def test_bodies_that_arrive_are_compared_with_the_rig(ports, capsys):
 
 @pytest.mark.parametrize(
     ("version", "says"),
-    [((3, 0), "answers but streams no frames"), ((2, 9), "speaks NatNet 2.9; 3.0")],
+    [((3, 0), "answers but streams no frames"), ((2, 9), "speaks NatNet 2.9, and this program understands 3.0")],
 )
 def test_motive_that_answers(ports, capsys, version, says):
     with FakeMotive(version, {1: "left_wrist"}) as motive:
