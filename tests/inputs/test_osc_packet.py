@@ -76,7 +76,7 @@ def nested(depth):
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "expected"),
     [
         (b"", "0 bytes"),
         (b"/a\0", "3 bytes"),
@@ -96,13 +96,13 @@ def nested(depth):
         (bytes(MAX_DATAGRAM_BYTES + 4), "are allowed"),
     ],
 )
-def test_wrong_packets_are_named(data, says):
-    with pytest.raises(MessageError, match=says):
+def test_wrong_packets_are_named(data, expected):
+    with pytest.raises(MessageError, match=expected):
         split_packet(data)
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "expected"),
     [
         (b"/abc", "does not end"),
         (b"/ab\0,i\0x\0\0\0\7", "does not end"),
@@ -124,8 +124,8 @@ def test_wrong_packets_are_named(data, says):
         (b"/a\0\0,b\0\0", "0 bytes are left"),
     ],
 )
-def test_wrong_messages_are_named(data, says):
-    with pytest.raises(MessageError, match=says):
+def test_wrong_messages_are_named(data, expected):
+    with pytest.raises(MessageError, match=expected):
         read(data)
 
 

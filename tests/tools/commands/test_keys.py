@@ -31,7 +31,9 @@ def test_from_nothing_to_a_listed_client(keys):
     assert list(read_allow_list(keys.folder / "clients.allow").values()) == ["stage-pc"]
 
 
-@pytest.mark.parametrize(("words", "expected"), [(("make", "../x"), "cannot be the name of a client"), (("make", "a"), "make server")])
+@pytest.mark.parametrize(
+    ("words", "expected"), [(("make", "../x"), "cannot be the name of a client"), (("make", "a"), "make server")]
+)
 def test_what_cannot_be_made_is_reported(keys, words, expected):
     if expected != "make server":
         keys("make", "server")
