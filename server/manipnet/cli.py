@@ -5,9 +5,7 @@
 
 import argparse
 import logging
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -127,32 +125,25 @@ def _serve(config: ServerConfig, json_log: bool) -> int:
     from manipnet.net.curve_keys import KeyFileError
     from manipnet.net.errors import ListenError
     from manipnet.runtime.console import Console
+    from manipnet.runtime.signals import stop_on_signals
     from manipnet.server import Server
     from manipnet.synthesis.model.bundle import BundleError
     from manipnet.synthesis.objects.mesh import MeshError
 
-    stop = _stop_on_signals()
     console = Console(as_json=json_log)
     logging.basicConfig(level=logging.WARNING, handlers=[console], force=True)
     if not precompiler.idle:
         logging.getLogger(__name__).warning("the first start takes about 15 s longer, since code is compiled once")
     try:
-        server = Server(config, console.say, precompiler.wait)
-        server.run(stop.is_set)
+        with stop_on_signals() as stop:
+            server = Server(config, console.say, precompiler.wait)
+            server.run(stop.is_set)
     except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
     finally:
         console.close()
     return 0
-
-
-def _stop_on_signals() -> threading.Event:
-    stop = threading.Event()
-    for name in ("SIGINT", "SIGTERM", "SIGBREAK"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), lambda *_: stop.set())
-    return stop
 
 
 if __name__ == "__main__":

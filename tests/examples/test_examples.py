@@ -1,15 +1,16 @@
 """Every example runs as its docstring says, against a real server."""
 
 import os
+import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from live_server import LiveServer, Subscriber, serving
+from live_server import LiveServer, Subscriber, scene, serving
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -94,3 +95,24 @@ def test_fingers_are_synthesised_offline() -> None:
     lines = finished("synthesise_offline.py").splitlines()
     assert [line.split(" s ")[0] for line in lines] == ["0.00", "0.25", "0.50", "0.75", "1.00", "1.25"]
     assert lines[0].split(" s ")[1] != lines[-1].split(" s ")[1]
+
+
+def test_bodies_come_in_by_a_protocol_of_its_own(tiny_bundle: Path) -> None:
+    options = ["--mesh", "Box=cube", "--model", str(tiny_bundle), "--text-port=0"]
+    with serving(*options, program=[str(EXAMPLES / "own_protocol.py")]) as server:
+        subscriber = Subscriber(server.addresses["hands"])
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+            udp.connect(("127.0.0.1", int(server.addresses["text"].rpartition(":")[2])))
+            udp.send(b"now\nBox")
+            for frame in range(90):
+                udp.send("\n".join([str(frame / 60), *map(line, scene(frame / 60).items())]).encode())
+        assert "live" in {hand.state for hand in subscriber.next().hands.values()}
+        subscriber.close()
+        counters = server.ask({"op": "status"})["counters"]
+    assert counters["frames_in"]["text"] == 90
+    assert counters["frames_dropped"]["malformed"] == 1
+
+
+def line(body: tuple[str | int, Sequence[float] | None]) -> str:
+    name, pose = body
+    return " ".join(map(str, (name, *(pose or ()))))

@@ -1,6 +1,5 @@
 """Writes rig files: a whole configuration, or the result of a calibration into an existing file."""
 
-import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,6 +10,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
+from manipnet.common.atomic_file import replacing
 from manipnet.common.options import ConfigError, to_toml
 from manipnet.config.rig_reader import parse_rig
 from manipnet.config.settings import ActorConfig, BodyConfig, ObjectConfig, ServerConfig, protocol_options
@@ -69,19 +69,10 @@ def replace_file(path: Path, text: str, backup: bool = True) -> Path:
     if there is to be a `backup`. Returns the backup's path. Raises `OSError`.
     """
     kept = path.with_name(path.name + BACKUP_SUFFIX)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with open(part, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        if path.exists():
-            shutil.copymode(path, part)
-            if backup:
-                shutil.copy2(path, kept)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(path) as file:
+        file.write(text.encode("utf-8"))
+        if backup and path.exists():
+            shutil.copy2(path, kept)
     return kept
 
 

@@ -16,7 +16,7 @@ MAX_OFFSET_S: Final = 1e10
 
 
 class Peers:
-    """Knows the sockets of one server. From any thread."""
+    """Reports who is connected to a server. From any thread."""
 
     def __init__(self, senders: SenderStats) -> None:
         self._senders = senders
@@ -28,7 +28,7 @@ class Peers:
         self._clocks: dict[str, tuple[float, float, float]] = {}
 
     def handlers(self, status: Handler) -> dict[str, Handler]:
-        """`ping`, and `status` with what there is to say beside the answer of the given one."""
+        """The operations `ping` and `status`; the latter adds the peers to the answer of the given handler."""
         return {"ping": self._ping, "status": lambda request: {**status(request), **self._report()}}
 
     def gauges(self) -> Iterator[Gauge]:
@@ -40,7 +40,7 @@ class Peers:
         return {**self.connected(), **{name: count for name, count in senders.items() if count is not None}}
 
     def _ping(self, request: Request) -> dict[str, Any]:
-        """The server's monotonic clock; takes note of what who asks has found out about its own clock."""
+        """Answer with the server's monotonic clock; a client may tell how far its own clock is from it."""
         now_s = time.monotonic()
         if "name" in request:
             try:

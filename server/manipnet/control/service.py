@@ -1,4 +1,4 @@
-"""Requests from clients: a REP socket on a thread of its own, answering in the encoding of the question."""
+"""Requests from clients: a REP socket on a thread of its own, which answers in the encoding of the request."""
 
 import json
 import logging
@@ -10,7 +10,7 @@ from typing import Final
 import msgpack
 import zmq
 
-from manipnet.control.request import Handler, Request, RequestError, _show
+from manipnet.control.request import Handler, Request, RequestError, quoted
 from manipnet.net.addresses import is_loopback
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.errors import ListenError
@@ -21,15 +21,15 @@ from manipnet.telemetry import CONTROL_OPS, Telemetry
 MAX_REQUEST_BYTES: Final = 4096
 REQUESTS_PER_S: Final = 200
 BURST: Final = 50
-"""Of all clients together; beyond it answers take longer, for most requests cost the hands some of their time."""
+"""Totals over all clients; above them, replies are delayed to protect tick time."""
 LOCAL_OPS: Final = ("add_object",)
-ELSEWHERE: Final = "put the mesh into the server's folder --objects and select_object it, or drop it on the page there"
+"""Operations that open files of the server's machine."""
 _OPS: Final = tuple(op for op in CONTROL_OPS if op != "invalid")
 _log = logging.getLogger(__name__)
 
 
 class Control:
-    """Answers requests on `tcp://host:port` with `handlers`, one per operation, each called on this thread."""
+    """Answers requests on `tcp://host:port` with `handlers`, one per operation, which run on the control thread."""
 
     def __init__(
         self,
@@ -39,7 +39,10 @@ class Control:
         telemetry: Telemetry,
         keys: ServerKeys | None = None,
     ) -> None:
-        """Binds; raises `ListenError`. `start` begins to answer. With `keys` only clients on their list may ask."""
+        """Bind the socket; `start` begins to answer. With `keys`, only clients on their list may ask.
+
+        Raises `ListenError`.
+        """
         self._handlers, self._telemetry, self._throttle = handlers, telemetry, Throttle(REQUESTS_PER_S, BURST)
         try:
             self._bound = BoundSocket(zmq.REP, host, port, telemetry, keys, MAX_REQUEST_BYTES)
@@ -61,7 +64,7 @@ class Control:
             self._bound.close()
 
     def connected(self) -> int:
-        """How many clients there are at present. From any thread."""
+        """The number of connected clients. From any thread."""
         return self._bound.connected()
 
     def _run(self) -> None:
@@ -79,7 +82,7 @@ class Control:
                     _log.warning("control: an answer was lost: %s", error)
 
     def answer(self, parts: list[bytes], here: bool = True) -> bytes:
-        """The answer to one request, whatever it is; `here` if it comes from this machine."""
+        """The answer to one message, whatever it holds; `here` tells whether it comes from this machine."""
         as_json = bool(parts) and parts[0].lstrip()[:1] in (b"{", b"[")
         op = "invalid"
         try:
@@ -87,14 +90,15 @@ class Control:
             op = _operation(request)
             if op in LOCAL_OPS and not here:
                 raise RequestError(
-                    f"{op} opens files of the server's machine, so only clients there may ask; {ELSEWHERE}"
+                    f"{op} opens files of the server's machine, so only a client on that machine may ask; put the mesh "
+                    "into the server's folder --objects and use select_object, or drop the mesh on the live page there"
                 )
             reply = self._handlers[op](request)
         except RequestError as error:
             reply = {"error": str(error)}
         except Exception as error:
-            _log.exception("control: %s failed", op)
-            reply = {"error": f"{op} failed inside the server: {type(error).__name__}: {error}"}
+            _log.exception("control: the request %s failed", op)
+            reply = {"error": f"{op} failed because of a fault in the server: {type(error).__name__}: {error}"}
         self._telemetry.count("control_requests", op=op)
         return json.dumps(reply).encode() if as_json else msgpack.packb(reply) or b""
 
@@ -105,16 +109,16 @@ def _decode(parts: list[bytes]) -> Request:
     try:
         text = parts[0].lstrip()
         request = json.loads(text) if text[:1] in (b"{", b"[") else msgpack.unpackb(parts[0])
-    except Exception as error:  # both decoders have a dozen ways to refuse
+    except Exception as error:  # the decoders raise a dozen types of errors
         reason = str(error)[:80] or type(error).__name__
         raise RequestError(f"the request is neither a msgpack nor a JSON map: {reason}") from None
     if not isinstance(request, dict):
-        raise RequestError(f"the request is {type(request).__name__}; it must be a map with the key op")
+        raise RequestError(f"the request is of type {type(request).__name__}; it must be a map with the key op")
     return request
 
 
 def _operation(request: Request) -> str:
     op = request.get("op")
     if not isinstance(op, str) or op not in _OPS:
-        raise RequestError(f"op is {_show(op)}; allowed are {', '.join(_OPS)}")
+        raise RequestError(f"op is {quoted(op)}; allowed are {', '.join(_OPS)}")
     return op

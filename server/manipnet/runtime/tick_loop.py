@@ -13,9 +13,9 @@ from manipnet.actors.plan import Plan, synthesise
 from manipnet.actors.transitions import ShownHand
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.frame_intake import FrameIntake
-from manipnet.runtime.hands_output import HandsOutput
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_errors import TickErrors
+from manipnet.runtime.tick_publisher import TickPublisher
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import Tick
@@ -52,7 +52,7 @@ class TickLoop:
         self._telemetry, self._observer = telemetry, observer
         self._errors = TickErrors(actors, recorder, telemetry)
         self._intake = FrameIntake(actors, recorder, self._errors, telemetry)
-        self._output = HandsOutput(session, publish, self._errors, telemetry)
+        self._publisher = TickPublisher(session, publish, self._errors, telemetry)
 
     def run(self, stopping: Callable[[], bool], every_second: Callable[[float], None]) -> None:
         """Run until `stopping`; `every_second` is called with the time, at absolute deadlines one second apart."""
@@ -77,7 +77,7 @@ class TickLoop:
         plans = [(actor, self._plan(actor, tick)) for actor in self._actors if (tick := actor.poll(now_s)) is not None]
         self._synthesise([plan for _, plan in plans])
         for actor, plan in plans:
-            message = self._output.send(actor, plan.tick, self._show(actor, plan))
+            message = self._publisher.send(actor, plan.tick, self._show(actor, plan))
             if message is not None and self._observer is not None and self._observer.watched:
                 self._observer.see(actor, plan, message)
         return bool(plans)

@@ -1,9 +1,10 @@
-"""Run everything once before a client waits for it: compiled code, the network's memory, the first allocations."""
+"""Runs everything once before a client waits for it: compiled code, the network's memory, the first allocations."""
 
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -23,16 +24,14 @@ from manipnet.telemetry import Telemetry
 from manipnet.wire import encode_binary, encode_msgpack
 from manipnet.wire.bodies import BodyFrame, BodySample
 
-FRAMES = 120
-"""Two hands at a prop for one second: about thirty ticks."""
-
-
-LOOK_AHEAD_S = 0.4
-"""So that there is something to forecast."""
+FRAMES: Final = 120
+"""Frames of one second, in which two hands at a prop make about thirty ticks."""
+LOOK_AHEAD_S: Final = 0.4
+"""Less than the window needs, so that something has to be forecast."""
 
 
 def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: SolverName = "least_squares") -> None:
-    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
+    """Synthesise two hands at each shape for half a second, in a loop like the real one whose messages go nowhere."""
     for shape in shapes:
         telemetry = Telemetry()
         mailbox = Mailbox(telemetry)
@@ -57,7 +56,7 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: SolverName = "least
 
 
 def pose_a_hand(bundle: Bundle, solver: SolverName = "least_squares") -> None:
-    """Decode and solve: the kernel that this process compiles at a first start, while another compiles the rest."""
+    """Decode and solve one pose: at a first start this process compiles the solver, while another compiles the rest."""
     shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
     outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]

@@ -2,7 +2,6 @@
 
 import argparse
 import errno
-import json
 import logging
 import os
 import sys
@@ -11,8 +10,6 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
-
-import zmq
 
 from manipnet.common.options import ConfigError, Option
 from manipnet.config.flags import add_flags, read_flags
@@ -27,11 +24,12 @@ from manipnet.config.settings import (
     input_options,
     server_config,
 )
+from manipnet.control.client import ControlClient
+from manipnet.control.request import RequestError
 from manipnet.inputs import make_receivers
 from manipnet.inputs.declaration import Input
-from manipnet.net.curve_keys import KeyFileError, read_client_keys
+from manipnet.net.curve_keys import KeyFileError
 from manipnet.net.errors import ListenError
-from manipnet.net.zmq_socket import connect
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.doctor import other_interfaces
@@ -145,17 +143,13 @@ def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
 
 
 def ask_status(host: str, port: int, key: Path | None = None) -> dict[str, Any] | None:
-    """The `status` of the server that runs there, or None if no server answers. Raises `KeyFileError`."""
-    keys = None if key is None else read_client_keys(key)
-    with zmq.Context() as context, connect(context, zmq.REQ, (host, port), keys) as request:
-        request.send(b'{"op": "status"}')
-        if not request.poll(int(1e3 * ANSWER_S)):
-            return None
-        try:
-            answer = json.loads(request.recv())
-        except ValueError:
-            return None
-    return answer if isinstance(answer, dict) and "counters" in answer else None
+    """The `status` of the server that runs there, or None if none answers. Raises `KeyFileError`."""
+    address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    try:
+        answer = ControlClient(address, key, ANSWER_S).ask("status")
+    except (OSError, RequestError):
+        return None
+    return answer if "counters" in answer else None
 
 
 def _server_options() -> list[Option]:

@@ -1,8 +1,6 @@
 """A shape: what the hands sense of an object. Built once from a closed mesh, cached on disk by its content."""
 
-import logging
 import os
-import zipfile
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -25,12 +23,12 @@ from manipnet.synthesis.objects.distance_field import (
 from manipnet.synthesis.objects.library import library_file
 from manipnet.synthesis.objects.mesh import ClosedMesh, load_mesh
 from manipnet.synthesis.objects.rays import RayScene, ray_scene
+from manipnet.synthesis.objects.shape_cache import read_cached, write_cached
 from manipnet.synthesis.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES, simplified
 
 _CACHE_VERSION = f"1-{RESOLUTION}"
 PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
 """Shapes of the demo's objects, so that a first start need not compile what builds them."""
-_log = logging.getLogger(__name__)
 
 
 class Solid(NamedTuple):
@@ -135,12 +133,12 @@ def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
     folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
     path = folder / cache_name(mesh)
-    parts = _read_cache(path) or _read_cache(PREBUILT_FOLDER / path.name)
+    parts = read_cached(path) or read_cached(PREBUILT_FOLDER / path.name)
     if parts is None:
         sensed = simplified(mesh)
         bvh = build_bvh(sensed.vertices, sensed.faces)
         parts = bvh, build_field(bvh)
-        _write_cache(path, *parts)
+        write_cached(path, *parts)
     mass = mass_properties(mesh.vertices[mesh.faces])
     inertia = np.asarray(mass["inertia"]) / mass["mass"]
     return Shape(mesh, *parts, np.asarray(mass["center_mass"]), float(mass["volume"]), inertia)
@@ -150,26 +148,3 @@ def cache_name(mesh: ClosedMesh) -> str:
     """File name of a mesh's shape in any cache folder."""
     fewer = f"-{FEWER_TRIANGLES}" if len(mesh.faces) > MOST_TRIANGLES else ""
     return f"{mesh.content_hash[:32]}-{_CACHE_VERSION}{fewer}.npz"
-
-
-def _read_cache(path: Path) -> tuple[Bvh, Field] | None:
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
-            bvh = Bvh(*(data[name] for name in Bvh._fields))
-            return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        _log.warning("shape cache %s is unreadable (%s); building the shape again", path, error)
-        return None
-
-
-def _write_cache(path: Path, bvh: Bvh, field: Field) -> None:
-    part = path.with_suffix(f".{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(part, "wb") as file:
-            np.savez(file, **bvh._asdict(), **field._asdict())
-        part.replace(path)
-    except OSError as error:
-        _log.warning("shape cache %s cannot be written (%s); the next start builds it again", path, error)

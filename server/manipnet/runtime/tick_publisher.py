@@ -12,7 +12,7 @@ from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage, Latency, Side
 
 
-class HandsOutput:
+class TickPublisher:
     """Publishes the hands of every tick. Belongs to the tick thread."""
 
     def __init__(
