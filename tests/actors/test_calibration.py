@@ -25,13 +25,16 @@ from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, BodyConfig
 from manipnet.geometry import Array, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.surface import skin
+from manipnet.synthesis.hand.skin import skinned
 from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Side, Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
+
+HAND = shipped_hand()
 
 SIDES: tuple[Side, Side] = ("left", "right")
 SAMPLES = 240
@@ -133,8 +136,8 @@ def test_a_hand_that_is_not_on_its_mark_is_refused(side: Side) -> None:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_the_shown_pose_is_the_models_flat_hand_on_a_table(side: Side) -> None:
-    positions, rotations = forward_kinematics(np.zeros(20))
-    vertices = skin(positions, rotations)
+    positions, rotations = forward_kinematics(HAND, np.zeros(20))
+    vertices = skinned(HAND, positions, rotations)
     hand = mirror_points(vertices) if side == "left" else vertices
     hand = wrist_on_sheet(side)[:3] + quat_rotate(wrist_on_sheet(side)[3:], hand)
     heel = hand[np.abs(vertices[:, 0]) < 0.02]
@@ -230,7 +233,7 @@ def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array
 
 def apart(a: Array, b: Array) -> Array:
     """Distances of the joints of hands posed by two sets of angles `(..., 20)`."""
-    return np.linalg.norm(forward_kinematics(a)[0] - forward_kinematics(b)[0], axis=-1)
+    return np.linalg.norm(forward_kinematics(HAND, a)[0] - forward_kinematics(HAND, b)[0], axis=-1)
 
 
 def actor_config(offsets: dict[str, Array] | None = None, hand_scale: float = 1.0) -> ActorConfig:

@@ -24,8 +24,8 @@ from manipnet.config.settings import (
 from manipnet.geometry import quat_exp
 from manipnet.inputs.natnet import NatNetOptions
 from manipnet.outputs.zeromq import ZmqOutputOptions
-from manipnet.synthesis.hand.skeleton import DOF_NAMES
 from manipnet.synthesis.objects.library import library_file
+from manipnet.wire.hand_names import ANGLE_NAMES
 
 # --- printed and read
 
@@ -51,7 +51,7 @@ def actors(draw, name: str) -> ActorConfig:
         ObjectConfig(f"{name} {i}", BodyConfig(key, draw(offsets())), mesh, draw(st.sampled_from(["m", "cm"])), 0.5)
         for i, (key, mesh) in enumerate(zip(body[len(wrists) :], (library_file("mug"), Path(__file__)), strict=True))
     )
-    limits = draw(st.dictionaries(st.sampled_from(DOF_NAMES), st.just((-0.25, 0.75)), max_size=3))
+    limits = draw(st.dictionaries(st.sampled_from(ANGLE_NAMES), st.just((-0.25, 0.75)), max_size=3))
     placed = {wrist: BodyConfig(key, draw(offsets())) for wrist, key in zip(wrists, body, strict=False)}
     return ActorConfig(name, placed, things, draw(st.floats(0.3, 3.0)), limits)
 

@@ -11,10 +11,9 @@ import zmq
 from live_server import Stage, scene
 
 from manipnet.net.clock_offset import measure_offset
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
-from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.synthesis.objects.library import library_names, load_library_mesh
 from manipnet.telemetry import CONTROL_OPS
+from manipnet.wire.hand_names import ANGLE_NAMES, JOINT_NAMES, OPENXR_JOINT_NAMES
 
 OPS = ", ".join(op for op in CONTROL_OPS if op != "invalid")
 
@@ -24,7 +23,7 @@ def test_hello_says_what_a_client_must_know(stage: Stage, as_json: bool) -> None
     hello = stage.server.ask({"op": "hello"}, as_json)
     assert hello["schema"] == 1
     assert hello["joint_names"] == list(JOINT_NAMES)
-    assert hello["angle_names"] == list(DOF_NAMES)
+    assert hello["angle_names"] == list(ANGLE_NAMES)
     assert hello["openxr_joint_names"] == list(OPENXR_JOINT_NAMES)
     assert hello["actors"] == ["actor"]
     assert set(library_names()) <= set(hello["objects"])

@@ -57,7 +57,7 @@ def test_a_port_in_use_is_named_with_its_option(
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--model", "colossus"], "model 'colossus' is no folder and no shipped bundle"),
+        (["--model", "colossus"], "model 'colossus' is neither a folder nor a shipped bundle"),
         (["--mesh", "Box"], "'Box' is not NAME=FILE"),
         (["--mesh", "Box=nowhere.obj"], "nowhere.obj: no such file"),
         (["--mesh", "Box=readme.txt"], "readme.txt: .txt format is unknown; allowed are .obj, .ply, .stl, .glb"),
