@@ -23,14 +23,14 @@ from manipnet.actors.calibration import (
 from manipnet.actors.plan import synthesise
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, BodyConfig
-from manipnet.geometry import Array, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
+from manipnet.geometry import Array, Side, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.skin import skinned
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
-from manipnet.synthesis.synthesizer import Side, Synthesizer
+from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 

@@ -13,6 +13,7 @@ from manipnet.wire import HandsMessage
 from manipnet.wire.hands import Side
 
 HAND = shipped_hand()
+
 ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 """The joint at which each finger bone of `BONES` ends."""
 

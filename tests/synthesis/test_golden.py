@@ -68,7 +68,9 @@ def _in_world(hand: Hand, scenes: list[HandScene], steps: list[HandStep]) -> dic
         (scene.side, ShownHand("live", step.angles, scene.wrist[PRESENT], None))
         for scene, step in zip(scenes, steps, strict=True)
     ]
-    poses = [pose for part in (pairs[:2], pairs[2:]) for pose in hand_poses(hand, dict(part), 1.1).values()]
+    poses = list(hand_poses(HAND, dict(pairs[:2]), 1.1).values()) + list(
+        hand_poses(HAND, dict(pairs[2:]), 1.1).values()
+    )
     return {"joints": [pose.joints for pose in poses], "local_rotations": [pose.rotations for pose in poses]}
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from manipnet.geometry import (
     Array,
+    Side,
     compose,
     invert,
     mirror_poses,
@@ -24,7 +25,6 @@ from manipnet.geometry import (
     quat_rotate,
     transform,
 )
-from manipnet.synthesis.synthesizer import Side
 
 HAND_LENGTH_M: Final = 0.219
 """The model's hand, from the middle of the wrist to the tip of the middle finger."""

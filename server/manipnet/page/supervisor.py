@@ -19,13 +19,13 @@ from typing import Any, Final
 from manipnet.actors.actor import Actor
 from manipnet.actors.plan import Plan
 from manipnet.actors.props import Prop
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
 from manipnet.net.errors import ListenError
 from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.page.serialization import pack, unpack
 from manipnet.runtime.child_process import ChildProcess
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.synthesizer import HandStep, Side
+from manipnet.synthesis.synthesizer import HandStep
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
