@@ -106,11 +106,20 @@ def in_two_places() -> Array:
 @pytest.mark.parametrize(
     ("poses", "complaint"),
     [
-        (held(HERE)[:7], "left_wrist: 7 tracked samples in that time, 20 are the least; see that it is tracked"),
-        (moving(speed_m_s=0.005), r"left_wrist moved 6\.\d mm .* allowed are 3\.0 mm and 1\.5°; lay the hand down"),
-        (moving(spin_rad_s=0.05), r"left_wrist moved .* while it was to be still"),
-        (trembling(), r"left_wrist trembles by 5\.\d mm .* allowed are 3\.0 mm and 2\.0°; rest it on the table"),
-        (in_two_places(), "left_wrist: 80 of 240 samples are elsewhere than the rest; it moved, or its markers"),
+        (
+            held(HERE)[:7],
+            "left_wrist: only 7 tracked samples in that time, and at least 20 are needed; make sure that it is tracked",
+        ),
+        (
+            moving(speed_m_s=0.005),
+            r"left_wrist moved by 6\.\d mm .* at most 3\.0 mm and 1\.5° are allowed",
+        ),
+        (moving(spin_rad_s=0.05), r"left_wrist moved by .* while it had to be still"),
+        (
+            trembling(),
+            r"left_wrist trembles by 5\.\d mm .* at most 3\.0 mm and 2\.0° are allowed: rest it on the table",
+        ),
+        (in_two_places(), "left_wrist: 80 of 240 samples are far from the others; it moved, or its markers"),
     ],
 )
 def test_what_was_not_still_is_refused_with_the_reason(poses: Array, complaint: str) -> None:
@@ -183,7 +192,7 @@ def test_a_tracked_prop_may_say_where_the_sheet_lies(yaw: float, where) -> None:
 
 
 def test_a_prop_on_its_head_says_nothing() -> None:
-    with pytest.raises(CalibrationError, match="x axis points up or down"):
+    with pytest.raises(CalibrationError, match="x axis of the reference object points up or down"):
         sheet_under(pose((0, 0, 0), (0.0, 0.0, 1.0, 1.0)), 0.0)
 
 

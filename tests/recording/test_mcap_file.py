@@ -126,7 +126,7 @@ def test_damage_in_the_middle_costs_a_chunk(tmp_path: Path) -> None:
 def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "take.mcap"
     path.write_bytes(content)
-    with pytest.raises(RecordingError, match="is no recording"):
+    with pytest.raises(RecordingError, match="not a recording"):
         list(read_bodies(path))
     with pytest.raises(RecordingError, match=r"missing\.mcap: cannot be read"):
         read_about(tmp_path / "missing.mcap")

@@ -126,12 +126,12 @@ def test_what_cannot_be_used_is_refused_and_nothing_changes(stage: Stage, rig: P
     refused = {
         "left_wrist is not tracked at present": stage.server.ask({"op": "calibrate"}),
         "it is at the right hand's mark": ask_while(stage, crossed, op="calibrate", sheet=SHEET_SAID),
-        "m from the left wrist's mark, at most 0.20 m": ask_while(stage, shown(), op="calibrate"),
+        "m from the left wrist's mark; at most 0.20 m are allowed": ask_while(stage, shown(), op="calibrate"),
     }
 
     def walking(t_s: float):
         if t_s == 2.25:
-            refused["while it was to be still"] = stage.server.ask({"op": "calibrate", "sheet": SHEET_SAID})
+            refused["while it had to be still"] = stage.server.ask({"op": "calibrate", "sheet": SHEET_SAID})
         away = np.array([0.02 * t_s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         return clusters_of({side: wrist + away for side, wrist in shown().items()}, t_s)
 
@@ -143,7 +143,7 @@ def test_what_cannot_be_used_is_refused_and_nothing_changes(stage: Stage, rig: P
         return clusters_of(shown(), t_s)
 
     stage.perform(1.25, soon)
-    assert "tracked samples in that time, 16" in refused.pop("240 m tracked samples")["error"]
+    assert "tracked samples in that time, and at least 16" in refused.pop("240 m tracked samples")["error"]
     for complaint, answer in refused.items():
         assert complaint in answer["error"], answer
     assert rig.read_text(encoding="utf-8") == RIG

@@ -10,7 +10,7 @@ import pytest
 
 from manipnet.inputs.natnet.frames import read_frame
 from manipnet.telemetry import BODY_REASONS
-from manipnet.tracking.outlier_gate import CONFIRM_S, FORGET_S, FROZEN_S, MAX_BODIES_KNOWN, OutlierGate
+from manipnet.tracking.outlier_gate import CONFIRM_S, FORGET_S, FROZEN_S, MAX_BODIES, OutlierGate
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.takes.take import read_take
 
@@ -193,9 +193,9 @@ def test_senders_and_bodies_are_judged_apart():
 
 def test_memory_is_bounded():
     gate = OutlierGate()
-    for n in range(3 * MAX_BODIES_KNOWN):
+    for n in range(3 * MAX_BODIES):
         gate.check(frame(0.0, (f"body {n}", (0, 1, 0))))
-    assert len(gate._memories) <= MAX_BODIES_KNOWN
+    assert gate.known_bodies <= MAX_BODIES
 
 
 def test_reasons_are_counted_ones():
