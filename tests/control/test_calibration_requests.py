@@ -71,6 +71,7 @@ def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(
     for side in ("left", "right"):
         part = f"{side}_wrist"
         for offset in (actors_proxy.actors[0].offset(part), load_rig(rig).actors[0].wrists[part].offset):
+            assert offset is not None
             away_m, away_rad = difference(offset, CLUSTER)
             assert away_m < 1e-3
             assert away_rad < np.radians(0.5)

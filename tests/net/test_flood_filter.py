@@ -63,8 +63,8 @@ def test_the_program_is_bounded():
     assert len(program(many[-MAX_KNOWN:], 0.1)) == 8 * (5 * MAX_KNOWN + 4)
 
 
-class Recorder:
-    """Stands for the kernel: what it was told."""
+class Recorder(FloodFilter):
+    """Stands in for the kernel, and records what it is asked to do."""
 
     def __init__(self):
         self.engaged, self.shares = False, []
@@ -72,6 +72,7 @@ class Recorder:
     def engage(self, known, share):
         self.engaged = True
         self.shares.append(share)
+        return True
 
     def release(self):
         self.engaged = False

@@ -1,5 +1,6 @@
 """VMC out: bytes against the OSC specification, poses against a T-pose thought through by hand, another reader."""
 
+import io
 import select
 import socket
 import subprocess
@@ -23,7 +24,7 @@ HALF = np.sqrt(0.5)
 PLAIN = np.tile(IDENTITY, (17, 1))
 
 
-def local_rotations(angles, bent=None, by=None):
+def local_rotations(angles, bent=None, by=IDENTITY):
     """Local rotations `(17, 4)` of a right hand at `angles`; the bone `bent` turned by `by` in the wrist frame."""
     world = matrix_to_quat(forward_kinematics(angles)[1])
     if bent is not None:
@@ -117,6 +118,7 @@ def test_read_by_an_independent_osc_tool():
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     process = subprocess.Popen([oscdump, "-L", str(port)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert isinstance(process.stdout, io.BufferedReader)
     sender, message = vmc.VmcSender("127.0.0.1", port), messages()["live"]
     try:
         text, give_up = b"", time.monotonic() + 20

@@ -21,6 +21,7 @@ from manipnet.synthesis.model.features import features
 from manipnet.synthesis.model.layout import INPUT, PRESENT
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer, windows_of
+from manipnet.wire import Side
 from manipnet_tools.bench.shapes import gourd
 
 STORED = Path(__file__).with_name("golden.npz")
@@ -59,7 +60,7 @@ def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
 
 def _in_world(scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
     """What clients get of each hand, its size a little off."""
-    pairs = [
+    pairs: list[tuple[Side, ShownHand]] = [
         (scene.side, ShownHand("live", step.angles, scene.wrist[PRESENT], None))
         for scene, step in zip(scenes, steps, strict=True)
     ]

@@ -9,9 +9,9 @@ from typing import Any, Literal
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from manipnet.synthesis.ik.pose import SolverName
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
-from manipnet.synthesis.synthesizer import SolverName
 from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import data_folders, load_cases
 from manipnet_tools.evaluation.results import (

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from manipnet.geometry import Array
-from manipnet.synthesis.synthesizer import Side, SolverName
+from manipnet.synthesis.ik.pose import SolverName
+from manipnet.synthesis.synthesizer import Side
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.evaluation.scoring import Score, average
 

@@ -5,8 +5,9 @@ from collections.abc import Callable, Container, Iterator, Sequence
 from rich.progress import Progress
 
 from manipnet.geometry import Array
+from manipnet.synthesis.ik.pose import SolverName
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.synthesizer import SolverName, Synthesizer
+from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case
 from manipnet_tools.evaluation.results import (

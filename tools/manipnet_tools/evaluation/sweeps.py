@@ -13,10 +13,11 @@ import trimesh
 
 from manipnet import geometry
 from manipnet.geometry import Array
+from manipnet.synthesis.ik.pose import SolverName
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
-from manipnet.synthesis.synthesizer import Side, SolverName, Synthesizer
+from manipnet.synthesis.synthesizer import Side, Synthesizer
 from manipnet_tools.evaluation import baselines, metrics, physics
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case, data_folders, load_case
 from manipnet_tools.evaluation.roll_outs import synthesise
