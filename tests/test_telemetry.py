@@ -43,7 +43,7 @@ def test_a_counter_or_label_that_is_not_declared_is_an_error(name: str, label: d
     telemetry = Telemetry()
     telemetry.declare("frames_in", "osc")
     with pytest.raises(KeyError):
-        telemetry.count(name, **label)
+        telemetry.count(name, 1, **label)
 
 
 def test_what_is_declared_twice_is_one_label() -> None:

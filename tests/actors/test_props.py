@@ -10,6 +10,7 @@ from manipnet.geometry import Array, invert, quat_normalize, transform
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.tracking.tick import BodyAtTick
+from manipnet.wire import Side
 
 
 @pytest.fixture(scope="module")
@@ -19,7 +20,7 @@ def props(tmp_path_factory: pytest.TempPathFactory) -> list[Prop]:
     return [Prop("a", "cube", cube), Prop("b", "bowl", bowl), Prop("c", "cube", cube, 2.5)]
 
 
-def nearest(side: str, wrist: Array, props: list[Prop], poses: dict[str, Array], current: str | None) -> Prop:
+def nearest(side: Side, wrist: Array, props: list[Prop], poses: dict[str, Array], current: str | None) -> Prop:
     """The same choice by brute force."""
     palm = transform(wrist, np.array(PALM_M[side]))
     distances = [

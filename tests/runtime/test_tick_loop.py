@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_server import scene
+from tracked_bodies import frame
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
@@ -20,7 +21,6 @@ from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 from manipnet.synthesis.synthesizer import HandStep, Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.wire import HandsMessage, encode_msgpack
-from manipnet.wire.bodies import BodyFrame, BodySample
 
 HERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -71,20 +71,6 @@ class Bench:
             raise OSError("the cable is out")
         encode_msgpack(message)  # raises for a message that must not leave
         self.messages.append(message)
-
-
-def frame(t_s: float, poses) -> BodyFrame:
-    bodies = tuple(
-        BodySample(
-            key if isinstance(key, int) else None,
-            key if isinstance(key, str) else None,
-            tuple((pose or HERE)[:3]),
-            tuple((pose or HERE)[3:]),
-            pose is not None,
-        )
-        for key, pose in poses.items()
-    )
-    return BodyFrame(t_s, None, bodies, t_s, "zmq:bench")
 
 
 def actor(bundle: Bundle, catalog: ObjectCatalog, telemetry: Telemetry, *props: Prop, config=None) -> Actor:

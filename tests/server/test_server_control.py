@@ -42,7 +42,7 @@ def test_the_clock_is_measured_by_ping_and_published_with_its_uncertainty(stage:
         req.connect(stage.server.addresses["control"])
 
         def ping(**report: float | str) -> float:
-            req.send(msgpack.packb({"op": "ping", **report}) or b"")
+            req.send(msgpack.packb({"op": "ping", **report}))
             return msgpack.unpackb(req.recv())["t"]
 
         server = measure_offset(ping, lambda: time.monotonic() + ahead_s)

@@ -10,6 +10,7 @@ from live_server import Stage, scene, serving
 
 from manipnet.actors.calibration import HAND_LENGTH_M, MARK_M, difference, sheet_at, wrist_on_sheet
 from manipnet.geometry import Array, compose, invert, quat_exp
+from manipnet.wire import Side
 
 RIG = """# stage two
 [bodies]
@@ -20,7 +21,7 @@ right_wrist = 2
 body = "Box"
 mesh = "cube"
 """
-SIDES = {"left": "left_wrist", "right": 2}
+SIDES: dict[Side, str | int] = {"left": "left_wrist", "right": 2}
 CLUSTERS = {
     "left": np.concatenate([[0.03, 0.02, -0.01], quat_exp(np.array([1.0, -2.0, 0.5]))]),
     "right": np.concatenate([[-0.05, 0.04, 0.02], quat_exp(np.array([0.3, 1.0, 2.0]))]),
@@ -45,20 +46,20 @@ def stage(tiny_bundle: Path, rig: Path) -> Iterator[Stage]:
         stage.close()
 
 
-def clusters_of(wrists: dict[str, Array], t_s: float) -> dict[str | int, Array | None]:
+def clusters_of(wrists: dict[Side, Array], t_s: float) -> dict[str | int, Array]:
     """The tracked clusters of two wrists, within the noise of a tracker."""
     rng = np.random.default_rng(round(1e4 * t_s))
     noise = np.concatenate([rng.normal(0.0, 5e-4, 3), quat_exp(rng.normal(0.0, 0.01, 3))])
     return {SIDES[side]: compose(compose(wrist, invert(CLUSTERS[side])), noise) for side, wrist in wrists.items()}
 
 
-def shown(scale: float = 1.0, back: float = 0.0) -> dict[str, Array]:
+def shown(scale: float = 1.0, back: float = 0.0) -> dict[Side, Array]:
     """Both wrists on the sheet, or drawn `back` from their marks."""
     away = np.array([0.0, 0.0, back, 0.0, 0.0, 0.0, 0.0])
     return {side: compose(SHEET, wrist_on_sheet(side, scale) + away) for side in SIDES}
 
 
-def ask_while(stage: Stage, wrists: dict[str, Array], **request) -> dict:
+def ask_while(stage: Stage, wrists: dict[Side, Array], **request) -> dict:
     """The answer to a request made after the hands were held still for two seconds."""
     answer = {}
 
@@ -83,7 +84,7 @@ def test_a_calibration_is_in_force_at_once_and_stored(stage: Stage, rig: Path) -
         assert away_rad < np.radians(1.0)
         assert 0.5 < hand["spread_mm"] < 1.5
         assert hand["samples"] == pytest.approx(240, abs=5)
-    true = {side: np.array(scene(0.0)[f"{side}_wrist"]) for side in SIDES}
+    true: dict[Side, Array] = {side: np.array(scene(0.0)[f"{side}_wrist"]) for side in SIDES}
     message = stage.perform(0.5, lambda t: {**clusters_of(true, t), "Box": scene(t)["Box"]})[-1]
     for side in SIDES:
         away_m, away_rad = difference(message.hands[side].wrist, true[side])
