@@ -26,12 +26,7 @@ def main(address: str = "tcp://127.0.0.1:5555") -> None:
         if hands["t_publish"] - shown_s < 1.0:
             continue  # 60 messages arrive in a second; a line for each would be too many
         shown_s = hands["t_publish"]
-        print(
-            f"frame {hands['seq']}",
-            *(describe(side, hand) for side, hand in hands["hands"].items()),
-            sep="  ",
-            flush=True,
-        )
+        print(f"frame {hands['seq']}", *(describe(side, hand) for side, hand in hands["hands"].items()), sep="  ", flush=True)
 
 
 def describe(side: str, hand: dict) -> str:
