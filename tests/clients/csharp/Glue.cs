@@ -8,7 +8,7 @@ using ManipNet.Client.Unity;
 using UnityEditor;
 using UnityEngine;
 
-/// <summary>Runs the components on working stubs of the engine against a live server: `glue ADDRESS`.</summary>
+/// <summary>Runs the components on stubs of the engine with a live server: `glue ADDRESS`.</summary>
 static class Glue
 {
     static readonly Vector3[] Knuckles =

@@ -6,7 +6,10 @@ using System.Text;
 using System.Threading;
 using ManipNet.Client;
 
-/// <summary>Runs the engine-free core for the tests, which talk to it in lines of text: `decode FILES`, `live ADDRESS` and others.</summary>
+/// <summary>
+/// Runs the engine-free core for the tests, which talk to it in lines of text: `decode FILES`, `live ADDRESS` and
+/// others.
+/// </summary>
 static class Harness
 {
     static int Main(string[] args)
@@ -118,7 +121,10 @@ static class Harness
         }
     }
 
-    /// <summary>Reads a line with side, 15 poses and 5 tips and a line with a message in hex; prints 15 rotations and the hand's.</summary>
+    /// <summary>
+    /// Reads a line with side, 15 poses and 5 tips and a line with a message in hex; prints 15 rotations and the
+    /// hand's.
+    /// </summary>
     static void Retarget()
     {
         string line;
@@ -170,8 +176,8 @@ static class Harness
     }
 
     /// <summary>
-    /// Shows at about 90 Hz until standard input ends. Answers "arrivals" with number and time of every frame since the last
-    /// time, and any other line with figures.
+    /// Shows at about 90 Hz until standard input ends. Answers "arrivals" with number and time of every frame since the
+    /// last time, and any other line with figures.
     /// </summary>
     static void Live(string address)
     {
@@ -211,7 +217,9 @@ static class Harness
         Console.WriteLine("closed");
     }
 
-    /// <summary>Shows hands as a program would, and records what it received and showed. Only answers allocate.</summary>
+    /// <summary>
+    /// Shows hands as a program would, and records what it received and showed. Only answers allocate.
+    /// </summary>
     sealed class Display
     {
         public ManipNetClient Client;

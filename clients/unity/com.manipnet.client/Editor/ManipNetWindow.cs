@@ -3,7 +3,9 @@ using UnityEngine;
 
 namespace ManipNet.Client.Unity
 {
-    /// <summary>Tests a connection without play mode, shows the state of all receivers, and sets up a character.</summary>
+    /// <summary>
+    /// Tests a connection without play mode, shows the state of all receivers, and sets up a character.
+    /// </summary>
     public sealed class ManipNetWindow : EditorWindow
     {
         string _address = "tcp://127.0.0.1:5555";

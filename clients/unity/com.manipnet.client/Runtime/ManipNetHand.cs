@@ -4,8 +4,8 @@ using UnityEngine;
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// Moves the fingers of a rig, which is a Humanoid or has bones with known names under `root`. The rig's pose at the
-    /// moment when this component is enabled counts as its rest pose.
+    /// Moves the fingers of a rig, which is a Humanoid or has bones with known names under `root`. The rig's pose at
+    /// the moment when this component is enabled counts as its rest pose.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Hand")]
     [DefaultExecutionOrder(100)]

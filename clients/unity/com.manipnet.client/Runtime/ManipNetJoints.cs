@@ -3,8 +3,9 @@ using UnityEngine;
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// Moves the children whose names end in a joint's name, as L_IndexProximal does, with the 26 joints of a hand. Names
-    /// and axes are those of Unity's XR Hands (+z to the finger tip, +y out of the back). Missing children are created.
+    /// Moves the children whose names end in a joint's name, as L_IndexProximal does, with the 26 joints of a hand.
+    /// Names and axes are those of Unity's XR Hands (+z to the finger tip, +y out of the back). Missing children are
+    /// created.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Joints")]
     [DefaultExecutionOrder(100)]

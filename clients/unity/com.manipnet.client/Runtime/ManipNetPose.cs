@@ -2,10 +2,14 @@ using UnityEngine;
 
 namespace ManipNet.Client.Unity
 {
-    /// <summary>Converts from the project's axes (right-handed, Y up, metres) to Unity's (left-handed) by reversing x.</summary>
+    /// <summary>
+    /// Converts from the project's axes (right-handed, Y up, metres) to Unity's (left-handed) by reversing x.
+    /// </summary>
     public static class ManipNetPose
     {
-        /// <summary>The rotation from OpenXR's joints, whose -z points to the finger tip, to XR Hands', whose +z does.</summary>
+        /// <summary>
+        /// The rotation from OpenXR's joints, whose -z points to the finger tip, to XR Hands', whose +z does.
+        /// </summary>
         public static readonly Quaternion ForwardAlongBone = new Quaternion(0f, 1f, 0f, 0f);
 
         /// <summary>The position of the pose that begins at values[at].</summary>

@@ -24,7 +24,9 @@ namespace ManipNet.Client.Unity
         ManipNetClient _client;
         float _weight;
 
-        /// <summary>The pose to show in this frame, in the project's axes (right-handed); ManipNetPose converts it.</summary>
+        /// <summary>
+        /// The pose to show in this frame, in the project's axes (right-handed); ManipNetPose converts it.
+        /// </summary>
         public HandsFrame Hands
         {
             get { return _hands; }

@@ -112,7 +112,9 @@ namespace ManipNet.Client
         }
     }
 
-    /// <summary>Converts from the project's axes (right-handed, Y up, metres) to Unity's (left-handed) by reversing x.</summary>
+    /// <summary>
+    /// Converts from the project's axes (right-handed, Y up, metres) to Unity's (left-handed) by reversing x.
+    /// </summary>
     public static class UnityAxes
     {
         public static Vec3 Position(float[] values, int at)

@@ -3,8 +3,8 @@ using System;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// Poses the finger bones of any rig. Its bones may have any axes and lengths, because only their directions in the bind
-    /// pose are used. All poses are in the space of the rig's hand bone, in Unity's axes.
+    /// Poses the finger bones of any rig. Its bones may have any axes and lengths, because only their directions in the
+    /// bind pose are used. All poses are in the space of the rig's hand bone, in Unity's axes.
     /// </summary>
     public sealed class HandRig
     {
@@ -22,7 +22,7 @@ namespace ManipNet.Client
         /// <param name="positions">15 bind positions, thumb to little finger, proximal to distal.</param>
         /// <param name="rotations">15 bind rotations in the same order.</param>
         /// <param name="tips">5 finger tips in the bind pose.</param>
-        /// <param name="correctRestPose">Whether bones point where the hand's do; otherwise they turn as much as those do.</param>
+        /// <param name="correctRestPose">Whether bones point where the hand's do, or only turn as much.</param>
         public HandRig(Side side, Vec3[] positions, Quat[] rotations, Vec3[] tips, bool correctRestPose = true)
         {
             _wristToHand = Frame(positions[Middle], positions[Index] - positions[Little])
@@ -52,8 +52,8 @@ namespace ManipNet.Client
         }
 
         /// <summary>
-        /// The hand's bone for a finger bone of the rig. Unity's ThumbProximal combines the two carpal angles of the thumb,
-        /// so the thumb begins one bone later.
+        /// The hand's bone for a finger bone of the rig. Unity's ThumbProximal combines the two carpal angles of the
+        /// thumb, so the thumb begins one bone later.
         /// </summary>
         static int OurBone(int i)
         {
@@ -66,7 +66,10 @@ namespace ManipNet.Client
             return i % 3 == 2 ? Layout.BoneCount + i / 3 : OurBone(i) + 1;
         }
 
-        /// <summary>The stored pose is a right hand in the project's axes. Converting to Unity's axes mirrors it, as does a left hand.</summary>
+        /// <summary>
+        /// The stored pose is a right hand in the project's axes. Converting to Unity's axes mirrors it, as does a left
+        /// hand.
+        /// </summary>
         static Vec3 ZeroPosition(Side side, int joint)
         {
             float[] p = Layout.ZeroPositions;

@@ -2,10 +2,14 @@ using System;
 
 namespace ManipNet.Client
 {
-    /// <summary>Decodes the payload of `pose/bin`, which docs/protocol.md describes. Allocates only to explain a refusal.</summary>
+    /// <summary>
+    /// Decodes the payload of `pose/bin`, which docs/protocol.md describes. Allocates only to explain a refusal.
+    /// </summary>
     public static class HandsDecoder
     {
-        /// <summary>Fills the frame and returns null, or returns what is wrong and leaves the frame in an undefined state.</summary>
+        /// <summary>
+        /// Fills the frame and returns null, or returns what is wrong and leaves the frame in an undefined state.
+        /// </summary>
         public static string Decode(byte[] data, int start, int length, HandsFrame frame)
         {
             if (length < Layout.HeaderBytes || BitConverter.ToInt32(data, start) != Layout.Magic)

@@ -3,8 +3,8 @@ using System;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// Interpolates hands by capture time, a chosen delay behind, for any display rate; holds and then fades them on loss.
-    /// Not thread-safe. Allocates nothing after construction.
+    /// Interpolates hands by capture time, a chosen delay behind, for any display rate; holds and then fades them on
+    /// loss. Not thread-safe. Allocates nothing after construction.
     /// </summary>
     public sealed class Interpolator
     {
@@ -76,7 +76,9 @@ namespace ManipNet.Client
             return true;
         }
 
-        /// <summary>Begins anew, for a new session or after the sender's clock went back, as when a take loops.</summary>
+        /// <summary>
+        /// Begins anew, for a new session or after the sender's clock went back, as when a take loops.
+        /// </summary>
         void Restart(HandsFrame frame)
         {
             _ring.Clear();
@@ -86,7 +88,9 @@ namespace ManipNet.Client
             _starved = _hasShown;
         }
 
-        /// <summary>Whether the frame is backlog after a stall; if frames stay late for long, the clock has changed instead.</summary>
+        /// <summary>
+        /// Whether the frame is backlog after a stall; if frames stay late for long, the clock has changed instead.
+        /// </summary>
         bool IsStale(HandsFrame frame, double arrival)
         {
             if (arrival - frame.TCapture - _clock.Target <= StaleS)

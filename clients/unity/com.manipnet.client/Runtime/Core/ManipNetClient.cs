@@ -27,13 +27,15 @@ namespace ManipNet.Client
         /// <summary>Seconds since the newest frame arrived.</summary>
         public double AgeS;
 
-        /// <summary>Seconds from publication to arrival of the newest frame; meaningful only if server and client share a clock.</summary>
+        /// <summary>
+        /// Seconds from publication to arrival of the newest frame; meaningful only if server and client share a clock.
+        /// </summary>
         public double TransitS;
     }
 
     /// <summary>
-    /// Receives the hands of one actor on its own thread and reconnects by itself. Any thread may call the methods, and no
-    /// method waits for the network except Dispose, which waits for the thread.
+    /// Receives the hands of one actor on its own thread and reconnects by itself. Any thread may call the methods, and
+    /// no method waits for the network except Dispose, which waits for the thread.
     /// </summary>
     public sealed class ManipNetClient : IDisposable
     {

@@ -15,7 +15,9 @@ namespace ManipNet.Client
             _weights = new double[capacity];
         }
 
-        /// <summary>Writes the mean to `output`; names, states and the like come from the frame in the slot `reference`.</summary>
+        /// <summary>
+        /// Writes the mean to `output`; names, states and the like come from the frame in the slot `reference`.
+        /// </summary>
         public void Mix(HandsFrame[] frames, double[] weights, int reference, HandsFrame output)
         {
             output.CopyFrom(frames[reference]);
@@ -91,7 +93,9 @@ namespace ManipNet.Client
             return (float)sum;
         }
 
-        /// <summary>Sums quaternions, each with the sign that is nearer to the reference, which `output` still holds.</summary>
+        /// <summary>
+        /// Sums quaternions, each with the sign that is nearer to the reference, which `output` still holds.
+        /// </summary>
         void Quaternions(float[] output, int first, int stride)
         {
             for (int i = first; i < output.Length; i += stride)

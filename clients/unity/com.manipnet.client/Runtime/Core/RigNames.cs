@@ -7,9 +7,9 @@ namespace ManipNet.Client
     public static class RigNames
     {
         /// <summary>
-        /// Whether the name `bone` means this bone of this finger, both counted from zero. It knows the names of Unity and VMC
-        /// (LeftIndexProximal), Mixamo (mixamorig:LeftHandIndex1), Unreal (index_01_l), Rigify (f_index.01.L) and VRoid
-        /// (J_Bip_L_Index1).
+        /// Whether the name `bone` means this bone of this finger, both counted from zero. It knows the names of Unity
+        /// and VMC (LeftIndexProximal), Mixamo (mixamorig:LeftHandIndex1), Unreal (index_01_l), Rigify (f_index.01.L)
+        /// and VRoid (J_Bip_L_Index1).
         /// </summary>
         public static bool Matches(string bone, Side side, int finger, int part)
         {

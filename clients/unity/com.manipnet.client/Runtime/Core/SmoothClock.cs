@@ -3,8 +3,8 @@ using System;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// Estimates the sender's clock. The offset is a critically damped spring towards the smallest difference of arrival
-    /// and capture time in about the last second, so neither jitter nor a better estimate makes a step.
+    /// Estimates the sender's clock. The offset is a critically damped spring towards the smallest difference of
+    /// arrival and capture time in about the last second, so neither jitter nor a better estimate makes a step.
     /// </summary>
     public sealed class SmoothClock
     {

@@ -7,8 +7,9 @@ using System.Text;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// A ZeroMQ subscriber to one topic on a plain TCP socket: ZMTP 3 with the NULL mechanism. It allocates nothing after
-    /// the handshake. One thread uses it, but any may set Stop, which ends every wait within a twentieth of a second.
+    /// A ZeroMQ subscriber to one topic on a plain TCP socket: ZMTP 3 with the NULL mechanism. It allocates nothing
+    /// after the handshake. One thread uses it, but any may set Stop, which ends every wait within a twentieth of a
+    /// second.
     /// </summary>
     public sealed class ZmtpSubscriber
     {
@@ -181,11 +182,13 @@ namespace ManipNet.Client
             greeting[10] = 3;
             greeting[11] = 1;
             Encoding.ASCII.GetBytes("NULL", 0, 4, greeting, 12);
-            _socket.Send(greeting, 0, SignatureBytes, SocketFlags.None); // sent whole, it makes some servers close the connection without a reason
+            // Some servers that dislike the rest of the greeting close the connection without a reason, so it is sent later.
+            _socket.Send(greeting, 0, SignatureBytes, SocketFlags.None);
             while (_end < 64) ReceiveGreeting();
             if (Buffer[0] != 0xFF || (Buffer[9] & 1) == 0 || Buffer[10] < 3) throw new IOException("the other side does not speak ZMTP 3");
             string mechanism = Encoding.ASCII.GetString(Buffer, 12, 20).TrimEnd('\0');
-            if (mechanism != "NULL") throw new IOException("the server requires " + mechanism + ", which this client does not support; use a tunnel");
+            if (mechanism != "NULL")
+                throw new IOException("the server requires " + mechanism + ", which this client does not support; use a tunnel");
             bool byCommand = Buffer[11] >= 1;
             _resume = 64;
             _socket.Send(greeting, SignatureBytes, 64 - SignatureBytes, SocketFlags.None);

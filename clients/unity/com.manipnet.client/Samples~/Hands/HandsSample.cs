@@ -2,8 +2,8 @@ using ManipNet.Client.Unity;
 using UnityEngine;
 
 /// <summary>
-/// Shows a sphere at every joint of both hands. Add this to an empty object and press play while `manipnet-serve --demo`
-/// runs.
+/// Shows a sphere at every joint of both hands. Add this to an empty object and press play while `manipnet-serve
+/// --demo` runs.
 /// </summary>
 public sealed class HandsSample : MonoBehaviour
 {
