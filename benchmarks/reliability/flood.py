@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.support import ROOT, serving
 from benchmarks.traffic import Received, osc_sender, playing, receiving
-from manipnet.tracking.timeline import TICK_HZ
+from manipnet.tracking.tick import TICK_HZ
 
 from .motion import frames, mesh_options, motion
 from .row import Row, parser, report

@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.support import LinkQuality, LiveServer, Proxy, UdpProxy, ZmqProxy, serving
 from benchmarks.traffic import Received, osc_sender, playing, receiving, zmq_sender
-from manipnet.tracking.timeline import TICK_HZ
+from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import HandsMessage
 from manipnet_tools.bench.scenarios import Scenario
 

@@ -20,17 +20,21 @@ from manipnet.actors.calibration import (
     upright_on_sheet,
     wrist_on_sheet,
 )
+from manipnet.actors.plan import synthesise
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, BodyConfig
 from manipnet.geometry import Array, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.surface import skin
+from manipnet.synthesis.hand.skin import skinned
 from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Side, Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
+
+HAND = shipped_hand()
 
 SIDES: tuple[Side, Side] = ("left", "right")
 SAMPLES = 240
@@ -132,8 +136,8 @@ def test_a_hand_that_is_not_on_its_mark_is_refused(side: Side) -> None:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_the_shown_pose_is_the_models_flat_hand_on_a_table(side: Side) -> None:
-    positions, rotations = forward_kinematics(np.zeros(20))
-    vertices = skin(positions, rotations)
+    positions, rotations = forward_kinematics(HAND, np.zeros(20))
+    vertices = skinned(HAND, positions, rotations)
     hand = mirror_points(vertices) if side == "left" else vertices
     hand = wrist_on_sheet(side)[:3] + quat_rotate(wrist_on_sheet(side)[3:], hand)
     heel = hand[np.abs(vertices[:, 0]) < 0.02]
@@ -219,17 +223,17 @@ def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array
         poses |= {name: compose(poses[name], T) for name, T in clusters.items()}
         bodies = tuple(BodySample(None, name, tuple(T[:3]), tuple(T[3:]), True) for name, T in poses.items())
         actor.push(BodyFrame(i / 120, None, bodies, i / 120, "zmq:test"))
-        while (tick := actor.timeline.poll(i / 120)) is not None:
+        while (tick := actor.poll(i / 120)) is not None:
             plan = actor.plan(tick)
-            steps = synthesizer.step(list(plan.scenes.values()), list(plan.memories.values()))
-            hands = actor.show(plan, dict(zip(plan.scenes, steps, strict=True)))
-            shown.append([hands[side].shown.angles for side in SIDES])
+            synthesise([plan], synthesizer)
+            hands = actor.show(plan)
+            shown.append([hands[side].angles for side in SIDES])
     return np.array(shown)
 
 
 def apart(a: Array, b: Array) -> Array:
     """Distances of the joints of hands posed by two sets of angles `(..., 20)`."""
-    return np.linalg.norm(forward_kinematics(a)[0] - forward_kinematics(b)[0], axis=-1)
+    return np.linalg.norm(forward_kinematics(HAND, a)[0] - forward_kinematics(HAND, b)[0], axis=-1)
 
 
 def actor_config(offsets: dict[str, Array] | None = None, hand_scale: float = 1.0) -> ActorConfig:
@@ -272,7 +276,7 @@ def test_a_new_offset_takes_the_past_along(bundle, cube: Shape) -> None:
             actor.push(BodyFrame(i / 120, None, (sample,), i / 120, "zmq:test"))
         actors[name] = actor
     actors["late"].place("right_wrist", offset)
-    late, always = (actors[name].timeline.poll(1.0).bodies["right_wrist"].window for name in ("late", "always"))
+    late, always = (actors[name].poll(1.0).bodies["right_wrist"].window for name in ("late", "always"))
     assert np.allclose(late, always, atol=1e-12)
     assert np.array_equal(actors["late"].config.wrists["right_wrist"].offset, offset)
     raw = [actor.body_poses("right_wrist", 2.0) for actor in actors.values()]

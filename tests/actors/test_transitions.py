@@ -8,26 +8,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipnet.actors.output_guard import MAX_SPEED_RAD_S, MAX_WRIST_RAD_S, NotFiniteError, OutputGuard
-from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, Shown, State, state_at_age
+from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, ShownHand, state_at_age
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_S
+from manipnet.tracking.tick import TICK_S
+from manipnet.wire import State
 
-REST = DOF_LIMITS_RAD.mean(axis=1)
-FIST = DOF_LIMITS_RAD[:, 1].copy()
+HAND = shipped_hand()
+
+REST = HAND.limits.mean(axis=1)
+FIST = HAND.limits[:, 1].copy()
 HERE = np.array([0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0])
 THERE = np.concatenate([[0.6, 1.2, -0.3], quat_exp(np.array([0.0, 1.5, 0.3]))])
 
 
 def presence() -> PoseTransition:
-    return PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, Telemetry()))
+    return PoseTransition(REST, OutputGuard(HAND.limits, Telemetry()))
 
 
 def run(
-    hand: PoseTransition, ticks: int, state: State, angles, wrist, run: int = 0, held: object = "mug"
-) -> list[Shown]:
-    shown = [hand.show(state, angles, wrist, run, held, TICK_S) for _ in range(ticks)]
+    hand: PoseTransition, ticks: int, state: State, angles, wrist, run: int = 0, prop: str = "mug"
+) -> list[ShownHand]:
+    shown = [hand.show(state, angles, wrist, run, prop, TICK_S) for _ in range(ticks)]
     return [each for each in shown if each is not None]
 
 
@@ -92,14 +95,14 @@ def test_coming_back_glides_over_a_fifth_of_a_second() -> None:
 @settings(max_examples=40, deadline=None)
 def test_no_sequence_of_events_makes_it_jump_leave_its_limits_or_lose_its_finiteness(data) -> None:
     hand = presence()
-    low, high = DOF_LIMITS_RAD.T
+    low, high = HAND.limits.T
     (previous,) = run(hand, 1, "live", REST, HERE, -1)
     whole = (high - low).max()
     for i in range(data.draw(st.integers(1, 12))):
         state = data.draw(st.sampled_from(["live", "hold", "rest"]))
         angles = low + (high - low) * data.draw(st.floats(0.0, 1.0)) if state == "live" else None
         wrist = data.draw(st.sampled_from([HERE, THERE, None]))
-        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i, i):
+        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i, str(i)):
             assert np.isfinite(shown.angles).all()
             assert np.isfinite(shown.wrist).all()
             assert np.all((low <= shown.angles) & (shown.angles <= high))
@@ -153,10 +156,10 @@ def test_the_first_pose_shown_is_inside_the_limits_too() -> None:
 
 def test_angles_outside_the_limits_or_too_fast_are_kept_in_and_counted() -> None:
     telemetry = Telemetry()
-    hand = PoseTransition(REST, OutputGuard(DOF_LIMITS_RAD, telemetry))
-    run(hand, 1, "live", DOF_LIMITS_RAD[:, 0], HERE)
+    hand = PoseTransition(REST, OutputGuard(HAND.limits, telemetry))
+    run(hand, 1, "live", HAND.limits[:, 0], HERE)
     (shown,) = run(hand, 1, "live", FIST + 1.0, HERE)
-    steps = shown.angles - DOF_LIMITS_RAD[:, 0]
+    steps = shown.angles - HAND.limits[:, 0]
     assert steps.max() == pytest.approx(MAX_SPEED_RAD_S * TICK_S)
     assert np.all(shown.angles <= FIST)
     assert telemetry.counts()["output_guarded"] == {"limit": 1, "speed": 1}

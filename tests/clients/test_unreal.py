@@ -10,7 +10,7 @@ from checkout import CLIENTS, ROOT, VECTORS, need, publishing
 from languages import CPP, WARNINGS, run
 from make_vectors import messages
 
-from manipnet.outputs.livelink import hand_json
+from manipnet.outputs.livelink.sender import hand_json
 
 PLUGIN = CLIENTS / "unreal" / "ManipNetLiveLink"
 MODULE = PLUGIN / "Source" / "ManipNetLiveLink"

@@ -16,9 +16,11 @@ from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.request import RequestError
 from manipnet.geometry import compose, invert, quat_exp
 from manipnet.runtime.mailbox import Mailbox
-from manipnet.synthesis.hand.skeleton import DOF_COUNT, DOF_LIMITS_RAD
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
+
+HAND = shipped_hand()
 
 RIG = '# mine\n[bodies]\nleft_wrist = "left_wrist"  # taped\nright_wrist = "right_wrist"\n'
 CLUSTER = np.concatenate([[0.03, 0.02, -0.01], quat_exp(np.array([1.0, -2.0, 0.5]))])
@@ -35,7 +37,7 @@ def rig(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def actors_proxy(rig: Path) -> Iterator[ActorsProxy]:
-    bundle = SimpleNamespace(rest_angles=np.zeros(DOF_COUNT), limits=DOF_LIMITS_RAD)
+    bundle = SimpleNamespace(hand=HAND, rest_angles=np.zeros(HAND.angle_count), limits=HAND.limits)
     mailbox, stop = Mailbox(Telemetry()), threading.Event()
 
     def tick() -> None:

@@ -1,4 +1,4 @@
-"""Hands out, to a crowd: who does not read, and who may not, costs the others nothing."""
+"""Many clients of the hands: those that do not read, or may not connect, do not affect the others."""
 
 import itertools
 import threading
@@ -8,9 +8,10 @@ import pytest
 import zmq
 from publisher import message
 
-from manipnet.config.settings import ServerConfig, default_actor
+from manipnet.config.settings import ServerConfig
 from manipnet.control.service import Control
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.curve_keys import (
     ClientKeys,
     KeyFileError,
@@ -21,13 +22,22 @@ from manipnet.net.curve_keys import (
 )
 from manipnet.net.curve_keys import read_client_keys as read_keys
 from manipnet.net.zap import secure_client
+from manipnet.outputs import open_outputs
+from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
+from manipnet.outputs.websocket import WebSocketOptions
+from manipnet.outputs.zeromq import ZmqOutputOptions
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
 
-CONFIG = ServerConfig((default_actor(),), port=0, web_port=0)
+CONFIG = ServerConfig((), protocols=(ZmqOutputOptions(port=0), WebSocketOptions(web_port=0)))
 MOST_KEPT_BYTES = 6 << 20
-"""For a client that has stopped: `SEND_HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
+"""Kept for a client that does not read: `HIGH_WATER_MARK` messages, and the kernel's buffers of its connection."""
+
+
+def publisher_of(telemetry, keys=None):
+    return Publisher(open_outputs(CONFIG.of, Emission(telemetry, shipped_hand(), keys=keys)), telemetry)
 
 
 @pytest.fixture
@@ -43,7 +53,7 @@ def telemetry():
 
 @pytest.fixture
 def publisher(telemetry):
-    publisher = Publisher(CONFIG, telemetry)
+    publisher = publisher_of(telemetry)
     yield publisher
     publisher.close()
 
@@ -61,7 +71,7 @@ def subscriber(context, address, topic, keys=None, **options):
 
 
 def publish_until_heard(publisher, subs):
-    """Subscriptions take their time: publish until everybody has one message; the next number."""
+    """Publish until every subscriber has received a message. Returns the next number."""
     waiting = list(subs)
     for seq in itertools.count():
         publisher.publish(message(seq, seq / 60, 0.1))
@@ -77,7 +87,7 @@ def seq_of(sub):
 
 
 @pytest.mark.slow
-def test_a_subscriber_that_does_not_read_costs_the_others_nothing_and_is_bounded(publisher, context):
+def test_a_subscriber_that_does_not_read_does_not_affect_the_others(publisher, context):
     with ExitStack() as opened:
         readers = [opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_BIN)) for _ in range(2)]
         stopped = opened.enter_context(subscriber(context, publisher.addresses["hands"], b"", RCVHWM=1, RCVBUF=65_536))
@@ -109,9 +119,9 @@ def test_a_list_that_cannot_be_read_is_named_and_leaves_nothing_open(tmp_path):
     keys.allow_file.unlink()
     threads = threading.active_count()
     for start in (
-        lambda: Publisher(CONFIG, Telemetry(), keys),
+        lambda: publisher_of(Telemetry(), keys),
         lambda: Control("127.0.0.1", 0, {}, Telemetry(), keys),
-        ZmqBodies(print, Telemetry(), port=0, keys=keys).start,
+        ZmqBodies(ZEROMQ.intake(print, Telemetry()), port=0, keys=keys).start,
     ):
         with pytest.raises(KeyFileError, match=r"cannot read .*clients\.allow"):
             start()
@@ -126,14 +136,14 @@ STRANGERS = {
 
 
 @pytest.mark.parametrize(("keys", "reason"), STRANGERS.values(), ids=STRANGERS)
-def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, tmp_path, keys, reason):
+def test_clients_without_the_right_keys_can_do_nothing_and_are_counted(context, tmp_path, keys, reason):
     make_server_keys(tmp_path)
     server, friend = read_server_keys(tmp_path), read_keys(make_client_keys(tmp_path, "stage-pc"))
     frames, hands, bodies, control = [], Telemetry(), Telemetry(), Telemetry()
     with ExitStack() as opened:
-        publisher = Publisher(CONFIG, hands, server)
+        publisher = publisher_of(hands, server)
         opened.callback(publisher.close)
-        receiver = ZmqBodies(frames.append, bodies, port=0, keys=server)
+        receiver = ZmqBodies(ZEROMQ.intake(frames.append, bodies), port=0, keys=server)
         receiver.start()
         opened.callback(receiver.stop)
         asked = Control("127.0.0.1", 0, {"ping": lambda request: {"t": 0.0}}, control, server)

@@ -1,4 +1,4 @@
-"""VMC out: bytes against the OSC specification, poses against a T-pose thought through by hand, another reader."""
+"""VMC: bytes against the OSC specification, poses against a T-pose worked out by hand, and an independent reader."""
 
 import select
 import socket
@@ -11,23 +11,28 @@ from make_vectors import messages
 from pythonosc.osc_bundle import OscBundle
 
 from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
-from manipnet.outputs import vmc
+from manipnet.net.osc import osc_message
+from manipnet.outputs.declaration import EncodedHands
+from manipnet.outputs.vmc import sender as vmc
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import PARENTS
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import HandPose
+
+HAND = shipped_hand()
 
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 HALF = np.sqrt(0.5)
-PLAIN = np.tile(IDENTITY, (17, 1))
+PLAIN = vmc.VmcSkeleton(HAND, rest_pose_correction=False)
+CORRECTED = vmc.VmcSkeleton(HAND)
 
 
 def local_rotations(angles, bent=None, by=None):
     """Local rotations `(17, 4)` of a right hand at `angles`; the bone `bent` turned by `by` in the wrist frame."""
-    world = matrix_to_quat(forward_kinematics(angles)[1])
+    world = matrix_to_quat(forward_kinematics(HAND, angles)[1])
     if bent is not None:
         world[bent] = quat_multiply(by, world[bent])
     local = world.copy()
-    local[1:] = quat_multiply(quat_conjugate(world[PARENTS[1:17]]), world[1:])
+    local[1:] = quat_multiply(quat_conjugate(world[HAND.parents[1:17]]), world[1:])
     return local
 
 
@@ -37,15 +42,15 @@ def hand(rotations, wrist_q=IDENTITY):
 
 
 def test_bytes_are_those_of_the_osc_specification():
-    assert vmc.osc_message("/oscillator/4/frequency", 440.0) == bytes.fromhex(
+    assert osc_message("/oscillator/4/frequency", "f", 440.0).dgram == bytes.fromhex(
         "2f6f7363696c6c61746f722f342f6672657175656e6379002c66000043dc0000"
     )
-    assert vmc.osc_message("/foo", 1000, -1, "hello", 1.234, 5.678) == bytes.fromhex(
+    assert osc_message("/foo", "iisff", 1000, -1, "hello", 1.234, 5.678).dgram == bytes.fromhex(
         "2f666f6f000000002c69697366660000000003e8ffffffff68656c6c6f0000003f9df3b640b5b22d"
     )
 
 
-def test_a_bundle_fits_a_packet_and_says_what_the_specification_asks():
+def test_a_bundle_fits_a_packet_and_has_what_the_specification_asks_for():
     bundle = vmc.hand_bundle("right", messages()["live"].hands["right"], 1.5, PLAIN)
     assert len(bundle) + 28 <= 1500
     assert bundle[:16] == b"#bundle\0" + bytes(7) + b"\x01"
@@ -57,8 +62,17 @@ def test_a_bundle_fits_a_packet_and_says_what_the_specification_asks():
     assert {"RightHand", "RightThumbProximal", "RightLittleDistal"} <= set(names)
 
 
+def test_a_bundle_carries_the_poses_of_its_bones_in_their_order():
+    hand = messages()["live"].hands["left"]
+    bundle = OscBundle(vmc.hand_bundle("left", hand, 1.5, PLAIN))
+    sent = {m.params[0]: m.params[1:] for m in bundle if m.address == "/VMC/Ext/Bone/Pos"}
+    poses = PLAIN.bone_poses("left", hand)
+    assert list(sent) == list(poses)
+    np.testing.assert_allclose(list(sent.values()), list(poses.values()), atol=1e-6)
+
+
 def test_angle_zero_is_the_t_pose_without_correction():
-    poses = vmc.bone_poses("right", hand(local_rotations(np.zeros(20))), PLAIN)
+    poses = PLAIN.bone_poses("right", hand(local_rotations(np.zeros(20))))
     turned = [name for name, pose in poses.items() if abs(pose[3:] @ IDENTITY) < 1 - 1e-6]
     assert turned == ["RightHand"]  # this wrist is not in T-pose
 
@@ -66,8 +80,8 @@ def test_angle_zero_is_the_t_pose_without_correction():
 def test_a_finger_bent_by_a_right_angle():
     """T-pose, palm down, Unity: a right finger points to +x and curls to -y, a left one to -x and curls to -y."""
     bent = local_rotations(np.zeros(20), bent=6, by=quat_exp(np.array([0.0, np.pi / 2, 0.0])))
-    right = vmc.bone_poses("right", hand(bent), PLAIN)
-    left = vmc.bone_poses("left", hand(mirror_quats(bent)), PLAIN)
+    right = PLAIN.bone_poses("right", hand(bent))
+    left = PLAIN.bone_poses("left", hand(mirror_quats(bent)))
     np.testing.assert_allclose(right["RightIndexIntermediate"][3:], [0, 0, -HALF, HALF], atol=1e-4)
     np.testing.assert_allclose(left["LeftIndexIntermediate"][3:], [0, 0, HALF, HALF], atol=1e-4)
     np.testing.assert_allclose(right["RightIndexProximal"][3:], IDENTITY, atol=1e-4)
@@ -78,19 +92,16 @@ def test_wrists_in_t_pose_do_not_turn_the_hand():
     """A right wrist with fingers to -x, thumb to +z, back up in the project frame is the T-pose itself."""
     t_pose = matrix_to_quat(np.array([[-1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]]))
     flat = local_rotations(np.zeros(20))
-    right = vmc.bone_poses("right", hand(flat, t_pose), PLAIN)["RightHand"]
-    left = vmc.bone_poses("left", hand(mirror_quats(flat), mirror_quats(t_pose)), PLAIN)["LeftHand"]
+    right = PLAIN.bone_poses("right", hand(flat, t_pose))["RightHand"]
+    left = PLAIN.bone_poses("left", hand(mirror_quats(flat), mirror_quats(t_pose)))["LeftHand"]
     np.testing.assert_allclose(right, [vmc.FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
     np.testing.assert_allclose(left, [-vmc.FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
 
 
 def test_rest_pose_correction_makes_bones_point_where_the_hand_does():
     angles = np.linspace(0.0, 0.9, 20)
-    positions, _ = forward_kinematics(angles)
-    sender = vmc.VmcSender("127.0.0.1", 9)
-    correction = sender._correction
-    sender.close()
-    poses = vmc.bone_poses("right", hand(local_rotations(angles)), correction)
+    positions, _ = forward_kinematics(HAND, angles)
+    poses = CORRECTED.bone_poses("right", hand(local_rotations(angles)))
     for finger, joints in (("Thumb", (2, 3, 4, 17)), ("Little", (14, 15, 16, 21))):
         turn = IDENTITY
         straight = [HALF, 0.0, HALF] if finger == "Thumb" else [1.0, 0.0, 0.0]  # Unity: thumbs 45 degrees to the front
@@ -106,11 +117,11 @@ def test_read_by_an_independent_osc_tool():
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     process = subprocess.Popen([oscdump, "-L", str(port)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    sender, message = vmc.VmcSender("127.0.0.1", port), messages()["live"]
+    sender, message = vmc.VmcSender("127.0.0.1", port, HAND), messages()["live"]
     try:
         text, give_up = b"", time.monotonic() + 20
         while text.count(b"/VMC/Ext/Bone/Pos") < 32 and time.monotonic() < give_up:
-            sender.send(message)  # again and again: the tool does not tell when it listens
+            sender.send(EncodedHands(message, b"", b""))  # again and again: the tool does not tell when it listens
             while select.select([process.stdout], [], [], 0.05)[0]:
                 text += process.stdout.read1(65536)
     finally:
@@ -119,7 +130,7 @@ def test_read_by_an_independent_osc_tool():
         process.stdout.close()
         sender.close()
     lines = [line.split() for line in text.decode().splitlines()]
-    expected = vmc.bone_poses("right", message.hands["right"], vmc._rest_pose_correction())["RightIndexProximal"]
+    expected = CORRECTED.bone_poses("right", message.hands["right"])["RightIndexProximal"]
     row = next(line for line in lines if '"RightIndexProximal"' in line)
     assert row[1:3] == ["/VMC/Ext/Bone/Pos", "sfffffff"]
     np.testing.assert_allclose([float(x) for x in row[4:]], expected, atol=1e-5)

@@ -18,7 +18,7 @@ from manipnet.actors.props import Prop
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_HZ, TICK_S
+from manipnet.tracking.tick import TICK_HZ, TICK_S
 from manipnet.wire import HandsMessage
 
 RATE_HZ, SECONDS, SETTLE_S, STEP_S = 120.0, 4.0, 1.0, 0.002
@@ -42,7 +42,7 @@ def receive(bundle: Bundle, tmp_path: Path):
     def run(arrive: Arrive, look_ahead_s: float) -> list[HandsMessage]:
         telemetry = Telemetry()
         one = actor(bundle, ObjectCatalog(), telemetry, Prop("Box", "cube", shape))
-        one.timeline.look_ahead_s = look_ahead_s
+        one.look_ahead_s = look_ahead_s
         bench = Bench(bundle, tmp_path, [one], telemetry)
         sent = [i / RATE_HZ for i in range(round(SECONDS * RATE_HZ))]
         arrivals = sorted((at_s, t_s) for t_s in sent for at_s in arrive(t_s))

@@ -11,10 +11,9 @@ import zmq
 from live_server import Stage, scene
 
 from manipnet.net.clock_offset import measure_offset
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
-from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.synthesis.objects.library import library_names, load_library_mesh
 from manipnet.telemetry import CONTROL_OPS
+from manipnet.wire.hand_names import ANGLE_NAMES, JOINT_NAMES, OPENXR_JOINT_NAMES
 
 OPS = ", ".join(op for op in CONTROL_OPS if op != "invalid")
 
@@ -24,7 +23,7 @@ def test_hello_says_what_a_client_must_know(stage: Stage, as_json: bool) -> None
     hello = stage.server.ask({"op": "hello"}, as_json)
     assert hello["schema"] == 1
     assert hello["joint_names"] == list(JOINT_NAMES)
-    assert hello["angle_names"] == list(DOF_NAMES)
+    assert hello["angle_names"] == list(ANGLE_NAMES)
     assert hello["openxr_joint_names"] == list(OPENXR_JOINT_NAMES)
     assert hello["actors"] == ["actor"]
     assert set(library_names()) <= set(hello["objects"])
@@ -153,7 +152,7 @@ BAD = [
     ({"op": "look_ahead", "seconds": 0.6}, "seconds is 0.6; allowed are 0.0 … 0.5"),
     ({"op": "look_ahead", "seconds": float("nan")}, "seconds is nan; it must be a number"),
     ({"op": "look_ahead", "seconds": True}, "seconds is True; it must be a number"),
-    ({"op": "select_object", "object": "cube"}, "body is missing or no name"),
+    ({"op": "select_object", "object": "cube"}, "body is missing; give the streaming id or the name"),
     ({"op": "select_object", "body": "Box", "object": "cloud"}, "object is 'cloud'; allowed are "),
     ({"op": "select_object", "body": "Box", "object": "cube", "scale": 0}, "scale is 0; allowed are 0.2 … 5.0"),
     ({"op": "select_object", "body": "left_wrist", "object": "cube"}, "body 'left_wrist' is the left_wrist"),

@@ -7,9 +7,11 @@ import pytest
 from live_server import Stage, Subscriber, scene
 
 from manipnet.actors.output_guard import MAX_SPEED_RAD_S
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
-from manipnet.tracking.timeline import TICK_S
+from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet.tracking.tick import TICK_S
 from manipnet.wire import TOPIC_BIN, HandsMessage
+
+HAND = shipped_hand()
 
 
 def assert_whole(stage: Stage, messages: list[HandsMessage], seconds: float) -> None:
@@ -17,7 +19,7 @@ def assert_whole(stage: Stage, messages: list[HandsMessage], seconds: float) -> 
     assert len(messages) == round(seconds * 60) + 1
     assert np.allclose(np.diff([m.t_capture for m in messages]), TICK_S)
     assert all(b.seq == a.seq + 1 for a, b in pairwise(messages))
-    low, high = DOF_LIMITS_RAD.T
+    low, high = HAND.limits.T
     for a, b in pairwise(messages):
         for side, hand in b.hands.items():
             assert np.all((low - 1e-6 <= hand.angles) & (hand.angles <= high + 1e-6))

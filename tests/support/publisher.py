@@ -7,7 +7,7 @@ import time
 import numpy as np
 import zmq
 
-from manipnet.outputs.websocket import WebSocketPublisher
+from manipnet.outputs.websocket.server import WebSocketPublisher
 from manipnet.telemetry import Telemetry
 from manipnet.wire import (
     TOPIC_BIN,
@@ -60,7 +60,7 @@ def main() -> None:
     port = options.port or socket.bind_to_random_port("tcp://127.0.0.1")
     if options.port:
         socket.bind(f"tcp://127.0.0.1:{port}")
-    websocket = WebSocketPublisher("127.0.0.1", options.websocket_port, Telemetry())
+    websocket = WebSocketPublisher(Telemetry(), "127.0.0.1", options.websocket_port)
     print(f"ready tcp://127.0.0.1:{port} {websocket.address}", flush=True)
     start = time.monotonic()
     for seq in itertools.count():

@@ -16,8 +16,8 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from manipnet.config.settings import is_loopback
-from manipnet.outputs.websocket import LOCAL_PAGES
+from manipnet.net.addresses import is_loopback
+from manipnet.outputs.websocket.server import LOCAL_PAGES
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
 """Whether the connection being served may change anything: a page of this machine, looked at on this machine."""

@@ -27,9 +27,9 @@ from mcap.writer import Writer
 from numpy.typing import NDArray
 
 from manipnet.geometry import Array
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
 from manipnet.wire import HandsMessage, decode_msgpack, encode_msgpack
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, bodies_map, parse_bodies
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES
 
 BODIES: Final = "/bodies"
 HANDS: Final = "/hands"

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
-from manipnet.synthesis.synthesizer import SolverName
 from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import data_folders, load_cases
 from manipnet_tools.evaluation.results import (
@@ -21,6 +19,7 @@ from manipnet_tools.evaluation.results import (
     row_name,
 )
 from manipnet_tools.evaluation.roll_outs import evaluate, folds
+from manipnet_tools.terminal import open_console
 
 Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
 
@@ -38,7 +37,7 @@ class EvaluateOptions:
     are missing are trained, which takes long, and kept there."""
     protocol: Protocol = "seen"
     """seen: the last 20 % of every take. unseen: every take with a model that has not seen its object."""
-    solver: tuple[SolverName, ...] = ("least_squares", "none")
+    solver: tuple[str, ...] = ("least_squares", "none")
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""
@@ -52,7 +51,7 @@ class EvaluateOptions:
 
 def run(options: EvaluateOptions) -> None:
     """Evaluate, print the tables, write what was asked for. Raises `DataError` and `BundleError`."""
-    console = Console()
+    console = open_console(stderr=False)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
         if options.sweep:
