@@ -27,8 +27,7 @@ from manipnet.common.options import (
     parse_endpoint,
     to_toml,
 )
-from manipnet.config.settings import SOLVERS, ServerConfig, all_options, protocol_options
-from manipnet.synthesis.ik.pose import SOLVERS as EXISTING_SOLVERS
+from manipnet.config.settings import ServerConfig, all_options, protocol_options
 
 
 @dataclass(frozen=True)
@@ -155,10 +154,6 @@ def test_the_help_has_every_option_with_its_default(capsys: pytest.CaptureFixtur
     for each in all_options().values():
         assert f"{each.flag} {each.kind.metavar}".strip() in text
         assert f"{each.help} (default: {each.shown_default})" in text or not each.shown_default
-
-
-def test_the_solvers_are_those_that_exist() -> None:
-    assert SOLVERS == EXISTING_SOLVERS
 
 
 HEAVY = {

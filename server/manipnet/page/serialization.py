@@ -26,9 +26,7 @@ def unpack(payload: bytes) -> tuple[str, Any]:
 
 
 def _packed(value: Any) -> bytes:
-    payload = msgpack.packb(value, default=_extended)
-    assert payload is not None  # only None when msgpack streams into a buffer
-    return payload
+    return msgpack.packb(value, default=_extended)
 
 
 def _unpacked(payload: bytes) -> Any:
