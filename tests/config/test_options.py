@@ -28,11 +28,8 @@ from manipnet.common.options import (
     to_toml,
 )
 from manipnet.config.settings import ServerConfig, all_options, protocol_options
-<<<<<<< HEAD
-=======
 from manipnet.synthesis.ik.pose import pose_kernel
 from manipnet.synthesis.ik.solvers import SOLVERS
->>>>>>> h-synth
 
 
 @dataclass(frozen=True)
@@ -161,8 +158,6 @@ def test_the_help_has_every_option_with_its_default(capsys: pytest.CaptureFixtur
         assert f"{each.help} (default: {each.shown_default})" in text or not each.shown_default
 
 
-<<<<<<< HEAD
-=======
 def test_every_solver_of_the_table_can_be_chosen_and_has_a_kernel() -> None:
     solver = all_options()["solver"]
     for name in SOLVERS:
@@ -170,7 +165,6 @@ def test_every_solver_of_the_table_can_be_chosen_and_has_a_kernel() -> None:
         assert callable(pose_kernel(name))
 
 
->>>>>>> h-synth
 HEAVY = {
     "numpy",
     "numba",
