@@ -76,7 +76,7 @@ def _package_state() -> str:
     package = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
     files = (p for part in COMPILED for p in (package / part, *(package / part).rglob("*")))
-    for path in sorted(p for p in files if p.suffix in (".py", ".npz")):
+    for path in sorted(p for p in files if p.suffix == ".py"):
         stat = path.stat()
         digest.update(f"{path.relative_to(package)} {stat.st_size} {stat.st_mtime_ns}".encode())
     return digest.hexdigest()[:16]

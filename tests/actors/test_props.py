@@ -1,4 +1,4 @@
-"""Which prop a hand is about: the nearest one, whatever distances it spares itself."""
+"""The choice of a prop is that of the nearest one, although not every distance is computed."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ def props(tmp_path_factory: pytest.TempPathFactory) -> list[Prop]:
 
 
 def nearest(side: Side, wrist: Array, props: list[Prop], poses: dict[str, Array], current: str | None) -> Prop:
-    """The same by brute force."""
+    """The same choice by brute force."""
     palm = transform(wrist, np.array(PALM_M[side]))
     distances = [
         prop.shape.signed_distance(transform(invert(poses[prop.name]), palm)[None] / prop.scale)[0][0] * prop.scale
@@ -32,7 +32,7 @@ def nearest(side: Side, wrist: Array, props: list[Prop], poses: dict[str, Array]
 
 
 @pytest.mark.parametrize("current", [None, "a", "c"])
-def test_a_hand_is_about_the_nearest_prop(props: list[Prop], current: str | None) -> None:
+def test_a_hand_belongs_to_the_nearest_prop(props: list[Prop], current: str | None) -> None:
     rng = np.random.default_rng(5)
     for _ in range(60):
         wrist, *poses = np.concatenate([rng.normal(0.0, 0.15, (4, 3)), quat_normalize(rng.normal(size=(4, 4)))], axis=1)

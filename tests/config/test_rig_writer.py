@@ -1,4 +1,4 @@
-"""Rig files written: a configuration survives being printed and read, and a calibration changes nothing else."""
+"""Written rig files: a configuration survives being printed and read, and a calibration changes nothing else."""
 
 from dataclasses import fields, replace
 from ipaddress import ip_network
@@ -24,8 +24,8 @@ from manipnet.config.settings import (
 from manipnet.geometry import quat_exp
 from manipnet.inputs.natnet.options import NatNetOptions
 from manipnet.outputs.zeromq import ZmqOutputOptions
-from manipnet.synthesis.hand.skeleton import DOF_NAMES
 from manipnet.synthesis.objects.library import library_file
+from manipnet.wire.hand_names import ANGLE_NAMES
 
 # --- printed and read
 
@@ -53,7 +53,7 @@ def actors(draw, name: str) -> ActorConfig:
             zip(body[len(wrists) :], (library_file("mug") or Path(), Path(__file__)), strict=True)
         )
     )
-    limits = draw(st.dictionaries(st.sampled_from(DOF_NAMES), st.just((-0.25, 0.75)), max_size=3))
+    limits = draw(st.dictionaries(st.sampled_from(ANGLE_NAMES), st.just((-0.25, 0.75)), max_size=3))
     placed = {wrist: BodyConfig(key, draw(offsets())) for wrist, key in zip(wrists, body, strict=False)}
     return ActorConfig(name, placed, things, draw(st.floats(0.3, 3.0)), limits)
 
@@ -242,7 +242,10 @@ def test_line_ends_and_permissions_stay(tmp_path: Path) -> None:
     [
         (lambda path: path.unlink(), "No such file"),
         (lambda path: path.write_text("[bodies\n"), "could not be changed"),
-        (lambda path: path.write_text('[[actors]]\nname = "x"\nbodies.left_wrist = 1\n'), "no actor 'actor' any more"),
+        (
+            lambda path: path.write_text('[[actors]]\nname = "x"\nbodies.left_wrist = 1\n'),
+            "no longer has an actor 'actor'",
+        ),
         (
             lambda path: path.write_text('[bodies]\nleft_wrist = 1\nright_wrist = 2\n[[objects]]\nbody = "B"\n'),
             "object",
@@ -250,7 +253,9 @@ def test_line_ends_and_permissions_stay(tmp_path: Path) -> None:
         (lambda path: path.write_bytes(b"\xff\xfe"), "could not be changed"),
     ],
 )
-def test_a_file_that_cannot_be_changed_stays_and_the_lines_are_told(spoil, reason: str, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_changed_stays_as_it_is_and_the_lines_to_add_are_shown(
+    spoil, reason: str, tmp_path: Path
+) -> None:
     path = tmp_path / "rig.toml"
     path.write_text(FILES["plain"], encoding="utf-8")
     actor = calibrated(path)

@@ -14,10 +14,9 @@ from browser import Page, browsing
 from live_server import LiveServer, Sender, Subscriber, serving
 
 from manipnet.actors.calibration import difference, sheet_at, wrist_on_sheet
-from manipnet.geometry import compose, invert, quat_exp
+from manipnet.geometry import Side, compose, invert, quat_exp
 from manipnet.page.overlays import OVERLAYS
 from manipnet.recording.mcap_file import read_hands
-from manipnet.synthesis.synthesizer import Side
 from manipnet.wire import HandsMessage
 
 PATIENCE_S = 240.0

@@ -15,10 +15,10 @@ from manipnet.wire import (
     BodyPose,
     HandPose,
     HandsMessage,
+    Side,
     encode_binary,
     encode_msgpack,
 )
-from manipnet.wire.hands import Side
 
 RATE_HZ = 60
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])

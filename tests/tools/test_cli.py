@@ -99,7 +99,7 @@ def test_an_error_is_one_line(
     assert "must be tcp://HOST:PORT" in error_of(capsys, "replay", str(recording), "--to", "udp://x")
     assert "File exists" in error_of(capsys, "recover", str(recording), "--out", str(recording))
     (tmp_path / "text.mcap").write_text("text")
-    assert "is no recording" in error_of(
+    assert "not a recording" in error_of(
         capsys, "recover", str(tmp_path / "text.mcap"), "--out", str(tmp_path / "out.mcap")
     )
     monkeypatch.setitem(sys.modules, "torch", None)

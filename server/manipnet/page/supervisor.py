@@ -13,18 +13,19 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, Final
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.plan import Plan
 from manipnet.actors.props import Prop
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
 from manipnet.net.errors import ListenError
 from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.page.serialization import pack, unpack
 from manipnet.runtime.child_process import ChildProcess
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.synthesizer import HandStep, Side
+from manipnet.synthesis.synthesizer import HandStep
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
@@ -45,11 +46,12 @@ Answer = Callable[[list[bytes]], bytes]
 class LivePage:
     """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry) -> None:
-        """Raises `ListenError`. `answer` meets the page's requests, as it does any client's."""
+    def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry, hand_file: Path) -> None:
+        """Raises `ListenError`. `answer` meets the page's requests, as it does any client's; `hand_file` describes the
+        hand that is shown."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._answer, self._telemetry = answer, telemetry
+        self._answer, self._telemetry, self._hand_file = answer, telemetry, hand_file
         self.watched = False
         """Whether a browser is open: only then is there anything to `see`."""
         self._news, self._telling = threading.Condition(), threading.Lock()
@@ -105,7 +107,7 @@ class LivePage:
 
     def _serve(self) -> None:
         """One life of the page's process."""
-        child = ChildProcess("page", _page, self._listener)
+        child = ChildProcess("page", _page, self._listener, self._hand_file)
         ours = child.connection
         sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
         try:
@@ -178,10 +180,10 @@ def _prop(prop: Prop, offset: Array) -> PropView:
     return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
 
 
-def _page(connection: Connection, listener: socket.socket) -> None:
+def _page(connection: Connection, listener: socket.socket, hand_file: Path) -> None:
     from manipnet.page.app import serve  # what it needs is of no use to the server itself
 
-    serve(listener, connection)
+    serve(listener, connection, hand_file)
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -1,11 +1,11 @@
-"""Hands out: the message, declared once (`schema`), and its two encodings.
+"""The messages of the protocol: bodies, which come in, and hands, which go out in two encodings.
 
-A ZeroMQ frame is a topic followed at once by a payload.
+A ZeroMQ frame of hands is a topic, with a space at its end, and a payload.
 """
 
+from manipnet.geometry import SIDES, Side
 from manipnet.wire.binary_codec import decode_binary, encode_binary
 from manipnet.wire.hands import (
-    SIDES,
     STATES,
     TOPIC_BIN,
     TOPIC_MSGPACK,
@@ -14,7 +14,6 @@ from manipnet.wire.hands import (
     HandPose,
     HandsMessage,
     Latency,
-    Side,
     State,
 )
 from manipnet.wire.msgpack_codec import decode_msgpack, encode_msgpack

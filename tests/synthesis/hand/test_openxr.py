@@ -11,9 +11,12 @@ from manipnet.geometry import (
     quat_normalize,
     quat_rotate,
 )
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS, WEBXR_JOINT_NAMES, pose_in_world
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
+from manipnet.synthesis.hand.openxr import pose_in_world
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import Side
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS, WEBXR_JOINT_NAMES
+
+HAND = shipped_hand()
 
 INDEX = {name: i for i, name in enumerate(OPENXR_JOINT_NAMES)}
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -26,7 +29,7 @@ BONES += [(f, "distal", "tip") for f in FINGERS]
 
 
 def random_angles(seed: int) -> Array:
-    low, high = DOF_LIMITS_RAD.T
+    low, high = HAND.limits.T
     return np.random.default_rng(seed).uniform(low, high)
 
 
@@ -36,7 +39,7 @@ def random_wrist(seed: int) -> Array:
 
 
 def joints_of(side: Side, wrist: Array, angles: Array, scale: float = 1.0) -> Array:
-    return pose_in_world([side], angles[None], wrist[None], scale)[1][0]
+    return pose_in_world(HAND, [side], angles[None], wrist[None], scale)[1][0]
 
 
 def axes(joints: Array, *names: str) -> tuple[Array, Array]:
@@ -94,15 +97,15 @@ def test_plus_y_leaves_the_back_of_the_flat_hand(side: Side):
 def test_flexion_turns_every_bone_away_from_its_plus_y(side: Side):
     for name in ("INDEX", "MIDDLE", "RING", "PINKY", "THUMB"):
         finger = name.lower().replace("pinky", "little")
-        for dof in (i for i, d in enumerate(DOF_NAMES) if d.startswith(name) and d.endswith("_FE")):
-            if DOF_NAMES[dof] == "THUMB_CMC_FE":
+        for dof in (i for i, d in enumerate(HAND.angle_names) if d.startswith(name) and d.endswith("_FE")):
+            if HAND.angle_names[dof] == "THUMB_CMC_FE":
                 continue  # rolls the thumb across the palm
             bent = np.zeros(20)
             bent[dof] = 0.1
             before, after = joints_of(side, IDENTITY, np.zeros(20)), joints_of(side, IDENTITY, bent)
             _, back = axes(before, f"{finger}_distal")
             moved = after[INDEX[f"{finger}_tip"], :3] - before[INDEX[f"{finger}_tip"], :3]
-            assert moved @ back[0] < -0.9 * np.linalg.norm(moved), DOF_NAMES[dof]
+            assert moved @ back[0] < -0.9 * np.linalg.norm(moved), HAND.angle_names[dof]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -139,7 +142,7 @@ def test_tips_are_turned_like_their_distal_bones(side: Side):
 @pytest.mark.parametrize("dof", ["THUMB_CMC_FE", "THUMB_CMC_AA"])
 def test_both_carpal_angles_turn_the_thumb_metacarpal(dof: str):
     bent = np.zeros(20)
-    bent[DOF_NAMES.index(dof)] = 0.3
+    bent[HAND.angle_names.index(dof)] = 0.3
     flat, turned = joints_of("right", IDENTITY, np.zeros(20)), joints_of("right", IDENTITY, bent)
     assert abs(flat[INDEX["thumb_metacarpal"], 3:] @ turned[INDEX["thumb_metacarpal"], 3:]) == pytest.approx(
         np.cos(0.15), abs=1e-6
@@ -148,7 +151,7 @@ def test_both_carpal_angles_turn_the_thumb_metacarpal(dof: str):
 
 def test_thumb_mcp_turns_the_proximal_and_leaves_the_metacarpal():
     bent = np.zeros(20)
-    bent[DOF_NAMES.index("THUMB_MCP_FE")] = 0.3
+    bent[HAND.angle_names.index("THUMB_MCP_FE")] = 0.3
     flat, turned = joints_of("right", IDENTITY, np.zeros(20)), joints_of("right", IDENTITY, bent)
     same = np.all(np.isclose(flat, turned, atol=1e-12), axis=1)
     changed = {OPENXR_JOINT_NAMES[i] for i in np.flatnonzero(~same)}
