@@ -23,7 +23,8 @@ PATIENCE_S = 20.0
 STARTS_PROCESSES = {"subprocess", "multiprocessing", "serving", "publishing", "browsing", "run_node"}
 """A module that imports one of these has tests that start programs."""
 TESTS = Path(__file__).parent
-SLOW_FOLDERS = (TESTS / "tools/training", TESTS / "tools/bench")
+SLOW = (TESTS / "tools/training", TESTS / "tools/bench", TESTS / "tools/doctor", TESTS / "runtime/test_bad_network.py")
+"""Folders and files whose tests take a second each."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -32,7 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         fixtures, module = getattr(item, "fixturenames", ()), getattr(item, "module", None)
         if item.path.is_relative_to(TESTS / "clients"):
             item.add_marker("client")
-        if any(map(item.path.is_relative_to, SLOW_FOLDERS)):
+        if any(map(item.path.is_relative_to, SLOW)):
             item.add_marker("slow")
         if "manipnet_data" in fixtures:
             item.add_marker("dataset")

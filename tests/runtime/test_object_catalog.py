@@ -187,6 +187,7 @@ class Scene:
         return {side: hand.prop for side, hand in self.actor.hands.items()}
 
 
+@pytest.mark.slow
 def test_two_objects_one_in_each_hand_at_the_same_time(bundle: Bundle) -> None:
     catalog = ObjectCatalog()
     scene = Scene(bundle, catalog)

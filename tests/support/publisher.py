@@ -16,6 +16,7 @@ from manipnet.wire import (
     BodyPose,
     HandPose,
     HandsMessage,
+    Side,
     encode_binary,
     encode_msgpack,
 )
