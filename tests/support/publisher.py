@@ -16,7 +16,6 @@ from manipnet.wire import (
     BodyPose,
     HandPose,
     HandsMessage,
-    Side,
     encode_binary,
     encode_msgpack,
 )
