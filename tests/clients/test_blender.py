@@ -15,15 +15,12 @@ from checkout import ROOT, publishing
 from joint_poses import assert_joints
 from manipnet_client import decode
 from manipnet_client.retarget import BONES
-from random_hand import ENDS, posed
+from random_hand import ENDS, HAND, posed
 
 from manipnet import __version__
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate, quat_to_matrix
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import encode_binary
-
-HAND = shipped_hand()
 
 FAKE = ("bpy", "mathutils", "manipnet_live")
 

@@ -5,15 +5,12 @@ import pytest
 from languages import run
 from manipnet_client import decode
 from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, matches
-from random_hand import posed
+from random_hand import HAND, posed
 
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import encode_binary
-
-HAND = shipped_hand()
 
 
 def foreign_rig(side, rng, mirrored):

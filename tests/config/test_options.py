@@ -144,7 +144,7 @@ def test_no_two_options_have_the_same_key() -> None:
     assert len(declared) == len(set(declared)) == len(all_options())
 
 
-def test_the_other_fields_of_a_configuration_are_no_choices_of_a_user() -> None:
+def test_every_other_field_of_a_configuration_is_known() -> None:
     others = set(ServerConfig.__slots__) - {each.field for each in options_of(ServerConfig)}
     assert others == {"actors", "protocols", "rig"}
 

@@ -1,5 +1,6 @@
 """VMC: bytes against the OSC specification, poses against a T-pose worked out by hand, and an independent reader."""
 
+import io
 import select
 import socket
 import subprocess
@@ -27,7 +28,7 @@ PLAIN = VmcSkeleton(HAND, rest_pose_correction=False)
 CORRECTED = VmcSkeleton(HAND)
 
 
-def local_rotations(angles, bent=None, by=None):
+def local_rotations(angles, bent=None, by=IDENTITY):
     """Local rotations `(17, 4)` of a right hand at `angles`; the bone `bent` turned by `by` in the wrist frame."""
     world = matrix_to_quat(forward_kinematics(HAND, angles)[1])
     if bent is not None:
@@ -126,6 +127,7 @@ def test_read_by_an_independent_osc_tool():
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     process = subprocess.Popen([oscdump, "-L", str(port)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    assert isinstance(process.stdout, io.BufferedReader)
     sender, message = VmcSender("127.0.0.1", port, HAND), messages()["live"]
     try:
         text, give_up = b"", time.monotonic() + 20

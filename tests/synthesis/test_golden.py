@@ -14,6 +14,7 @@ from written_scene import scenes_at
 
 from manipnet.actors.hands_message import hand_poses
 from manipnet.actors.transitions import ShownHand
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.ik.pose import FEEDBACK_SHARE
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
@@ -22,6 +23,7 @@ from manipnet.synthesis.model.layout import PRESENT, layout_of
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer, windows_of
+from manipnet.wire import Side
 from manipnet_tools.bench.shapes import gourd
 
 HAND = shipped_hand()
@@ -56,14 +58,14 @@ def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
                 "raw_positions": [step.raw_positions for step in steps],
                 "distances": [step.distances for step in steps],
             }
-            | _in_world(scenes, steps)
+            | _in_world(bundle.hand, scenes, steps)
         )
     return {name: np.array([tick[name] for tick in ticks], dtype=np.float32) for name in ticks[0]}
 
 
-def _in_world(scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
+def _in_world(hand: Hand, scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
     """What clients get of each hand, its size a little off."""
-    pairs = [
+    pairs: list[tuple[Side, ShownHand]] = [
         (scene.side, ShownHand("live", step.angles, scene.wrist[PRESENT], None))
         for scene, step in zip(scenes, steps, strict=True)
     ]
