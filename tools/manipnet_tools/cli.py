@@ -84,7 +84,7 @@ VERBS = {
     "evaluate": Verb(
         "compare models with captured takes",
         "manipnet_tools.evaluation.command",
-        "manipnet_tools.evaluation.command.EvaluateOptions",
+        "manipnet_tools.evaluation.options.EvaluateOptions",
         (
             "--data DATASET                                    the shipped model on the last 20 % of every take",
             "--data DATASET --model models/mine --json figures.json",
@@ -93,19 +93,19 @@ VERBS = {
     "train": Verb(
         "train a model on captured takes",
         "manipnet_tools.training.train",
-        "manipnet_tools.training.train.TrainOptions",
+        "manipnet_tools.training.options.TrainOptions",
         ("--data DATASET --out models/mine",),
     ),
     "ablate": Verb(
         "train and evaluate the rows of the paper's Table 1",
         "manipnet_tools.evaluation.ablate",
-        "manipnet_tools.evaluation.ablate.AblateOptions",
+        "manipnet_tools.evaluation.options.AblateOptions",
         ("--data DATASET --out ablation                both protocols, 49 short trainings",),
     ),
     "quantise": Verb(
         "convert a bundle to 8-bit weights",
         "manipnet_tools.training.quantise",
-        "manipnet_tools.training.quantise.QuantiseOptions",
+        "manipnet_tools.training.options.QuantiseOptions",
         ("manipnet-full --out models/manipnet-full-int8",),
     ),
     "bench": Verb(

@@ -1,7 +1,7 @@
 """Pictures of hands and objects without a display or GPU: Embree rays, three lights, soft occlusion.
 
-A scene is a list of `Solid`s in one right-handed, Y-up frame in metres. `render` draws one view, `contact_sheet` lays
-several beside each other. Needs embreex and Pillow (extra `train`).
+A scene is a list of `PaintedMesh` in one right-handed, Y-up frame in metres. `render` draws one view, and
+`contact_sheet` lays several beside each other. It needs embreex and Pillow (extra `train`).
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from manipnet.geometry import Array
+
 Image = NDArray[np.uint8]
 
 SKIN_RIGHT = (0.80, 0.52, 0.40)
@@ -32,7 +33,7 @@ _LIGHTS = (
 
 
 @dataclass(frozen=True)
-class Solid:
+class PaintedMesh:
     """A triangle mesh: `vertices (V, 3)`, `faces (F, 3)`, linear `color (3,)` or one per vertex `(V, 3)`."""
 
     vertices: Array
@@ -42,7 +43,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole at `eye` looking at `target`, both `(3,)`; `fov` is the vertical angle of view in radians."""
+    """A pinhole camera at `eye` that looks at `target`, both `(3,)`; `fov` is the vertical field of view in radians."""
 
     eye: Array
     target: Array
@@ -50,7 +51,7 @@ class Camera:
 
     @staticmethod
     def orbit(target: Array, distance: float, azimuth: float, elevation: float) -> "Camera":
-        """Around `target`, angles in radians: azimuth 0 looks along -z, a quarter turn looks along -x."""
+        """A camera around `target`; angles in radians: azimuth 0 looks along -z, a quarter turn looks along -x."""
         flat = np.cos(elevation)
         out = np.array([flat * np.sin(azimuth), np.sin(elevation), flat * np.cos(azimuth)])
         return Camera(np.asarray(target) + distance * out, np.asarray(target))
@@ -63,7 +64,7 @@ class Camera:
         return np.stack([right, np.cross(back, right), back])
 
 
-def beads(points: Array, radius: float, color: tuple[float, float, float]) -> Solid:
+def beads(points: Array, radius: float, color: tuple[float, float, float]) -> PaintedMesh:
     """Small balls at `points (n, 3)`."""
     import trimesh
 
@@ -71,7 +72,7 @@ def beads(points: Array, radius: float, color: tuple[float, float, float]) -> So
     return _repeat(np.asarray(points)[:, None] + ball.vertices, ball.faces, color)
 
 
-def rods(starts: Array, ends: Array, radius: float, color: tuple[float, float, float]) -> Solid:
+def rods(starts: Array, ends: Array, radius: float, color: tuple[float, float, float]) -> PaintedMesh:
     """Thin round bars from `starts (n, 3)` to `ends (n, 3)`."""
     import trimesh
 
@@ -88,12 +89,12 @@ def rods(starts: Array, ends: Array, radius: float, color: tuple[float, float, f
 
 
 def render(
-    solids: Sequence[Solid], camera: Camera, size: tuple[int, int] = (800, 600), floor_y: float | None = None
+    meshes: Sequence[PaintedMesh], camera: Camera, size: tuple[int, int] = (800, 600), floor_y: float | None = None
 ) -> Image:
-    """Draw one view, `size` = (width, height), to `(height, width, 3)`; `floor_y` adds a ground plane there."""
+    """Draw one view of `size` (width, height) as `(height, width, 3)`; `floor_y` adds a ground plane at this height."""
     if floor_y is not None:
-        solids = [*solids, _ground(camera.target, floor_y)]
-    scene = _Scene(solids, ground=floor_y is not None)
+        meshes = [*meshes, _ground(camera.target, floor_y)]
+    scene = _Scene(meshes, ground=floor_y is not None)
     rows = camera.axes()
     plane = 2.0 * np.tan(0.5 * camera.fov)
     width, height = size
@@ -126,18 +127,18 @@ def save_png(image: Image, path: Path | str) -> None:
 
 
 class _Scene:
-    """Triangles of all solids in one Embree scene, with a normal and a colour at every corner."""
+    """The triangles of all meshes in one Embree scene, with a normal and a colour at every corner."""
 
-    def __init__(self, solids: Sequence[Solid], ground: bool):
+    def __init__(self, meshes: Sequence[PaintedMesh], ground: bool):
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
         corners, normals, colors = [], [], []
-        for solid in solids:
-            faces = np.asarray(solid.faces)
-            corners.append(np.asarray(solid.vertices, dtype=np.float64)[faces])
-            normals.append(corner_normals(np.asarray(solid.vertices), faces))
-            colors.append(np.broadcast_to(solid.color, (len(solid.vertices), 3))[faces])
+        for mesh in meshes:
+            faces = np.asarray(mesh.faces)
+            corners.append(np.asarray(mesh.vertices, dtype=np.float64)[faces])
+            normals.append(corner_normals(np.asarray(mesh.vertices), faces))
+            colors.append(np.broadcast_to(mesh.color, (len(mesh.vertices), 3))[faces])
         self._normals, self._colors = np.concatenate(normals), np.concatenate(colors)
         self._ground_from = len(self._normals) - (2 if ground else 0)
         self._rays = EmbreeScene()
@@ -178,7 +179,7 @@ class _Scene:
         return colors
 
     def _ambient(self, points: Array, normals: Array) -> Array:
-        """Share of the sky near each point that nothing covers, `(n, 1)`."""
+        """The share of the sky above each point that nothing near it covers, `(n, 1)`."""
         u = np.cross(normals, np.eye(3)[np.argmin(np.abs(normals), axis=1)])
         u /= np.linalg.norm(u, axis=1, keepdims=True)
         v = np.cross(normals, u)
@@ -199,7 +200,7 @@ class _Scene:
 
 
 def corner_normals(vertices: Array, faces: NDArray[np.int64]) -> Array:
-    """A normal per face corner, `(F, 3, 3)`: faces around a vertex are averaged unless a crease lies between them."""
+    """A normal for each corner of each face, `(F, 3, 3)`: the mean of the faces there that no crease separates."""
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     area_normals = np.cross(b - a, c - a)
     unit = area_normals / np.maximum(np.linalg.norm(area_normals, axis=1, keepdims=True), 1e-20)
@@ -219,14 +220,14 @@ def corner_normals(vertices: Array, faces: NDArray[np.int64]) -> Array:
     return (normals / np.linalg.norm(normals, axis=1, keepdims=True)).reshape(len(faces), 3, 3)
 
 
-def _ground(around: Array, floor_y: float) -> Solid:
+def _ground(around: Array, floor_y: float) -> PaintedMesh:
     corners = np.array([(-1.0, 0.0, -1.0), (1.0, 0.0, -1.0), (1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)])
     vertices = _GROUND_EXTENT_M * corners + [around[0], floor_y, around[2]]
-    return Solid(vertices, np.array([(0, 2, 1), (0, 3, 2)]), tuple(_GROUND))
+    return PaintedMesh(vertices, np.array([(0, 2, 1), (0, 3, 2)]), tuple(_GROUND))
 
 
-def _repeat(vertices: Array, faces: NDArray[np.int64], color: tuple[float, float, float]) -> Solid:
-    """One solid of `n` copies of a mesh, `vertices (n, V, 3)`."""
+def _repeat(vertices: Array, faces: NDArray[np.int64], color: tuple[float, float, float]) -> PaintedMesh:
+    """One mesh made of `n` copies of a mesh, `vertices (n, V, 3)`."""
     copies, per_copy, _ = vertices.shape
     all_faces = (np.asarray(faces)[None] + per_copy * np.arange(copies)[:, None, None]).reshape(-1, 3)
-    return Solid(vertices.reshape(-1, 3), all_faces, color)
+    return PaintedMesh(vertices.reshape(-1, 3), all_faces, color)

@@ -138,7 +138,7 @@ class Synthesizer:
         solver: str = DEFAULT_SOLVER,
         on_stage: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """`solver` is a name in `ik.solvers.SOLVERS`; raises `ValueError` for any other.
+        """`solver` is a name in `ik.solvers.SOLVERS`; raises `UnknownSolverError` for any other.
 
         `on_stage` is called with the name of each stage when it ends: `sense`, `infer`, `ik`.
         """

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from manipnet_tools.evaluation import metrics
-from manipnet_tools.evaluation.cases import DataError, load_cases
+from manipnet_tools.evaluation.cases import load_cases
 from manipnet_tools.evaluation.scoring import average, score
+from manipnet_tools.takes.dataset import DataError
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def test_the_synthesis_gets_no_fingers(cases):
 
 
 def test_a_folder_that_is_not_the_dataset(tmp_path, manipnet_data):
-    with pytest.raises(DataError, match="no takes; expected folders BVH"):
+    with pytest.raises(DataError, match="holds no takes; expected are folders BVH"):
         load_cases(tmp_path)
-    with pytest.raises(DataError, match=r"no take \['spoon9'\]; there are"):
+    with pytest.raises(DataError, match="has no take spoon9; it has"):
         load_cases(manipnet_data, ("spoon9",))

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from manipnet_tools.evaluation.sweeps import to_and_fro
+from manipnet_tools.evaluation.sweeps import forwards_and_backwards
 from manipnet_tools.takes.rollout import HandInput
 
 
-def test_an_input_played_to_and_fro_has_its_windows_turned_on_the_way_back():
+def test_an_input_played_forwards_and_backwards_has_its_windows_turned_on_the_way_back():
     windows = np.arange(3 * 21 * 7, dtype=np.float64).reshape(3, 21, 7)
     seen = HandInput("right", windows, windows + 1.0, windows + 2.0, (), np.array([4, 5, 6]))
-    played = to_and_fro(seen, np.array([0, 1, 2, 2, 1]), np.array([True, True, True, False, False]))
+    played = forwards_and_backwards(seen, np.array([0, 1, 2, 2, 1]), np.array([True, True, True, False, False]))
     assert len(played) == 5
     np.testing.assert_array_equal(played.held, [4, 5, 6, 6, 5])
     np.testing.assert_array_equal(played.wrist[1], windows[1])

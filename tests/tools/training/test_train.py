@@ -17,10 +17,15 @@ from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet_tools.evaluation import ablate
-from manipnet_tools.training import quantise as compress
-from manipnet_tools.training.dataset import HandTrack
+from manipnet_tools.evaluation.options import ABLATION_TRAINING, AblateOptions
+from manipnet_tools.training import quantise
+from manipnet_tools.training.config import TrainConfig
+from manipnet_tools.training.dataset import CapturedHand
 from manipnet_tools.training.model import hidden_columns
-from manipnet_tools.training.train import FUTURE_FRAMES, Learner, Lessons, TrainConfig, save_bundle, train
+from manipnet_tools.training.options import QuantiseOptions
+from manipnet_tools.training.sampler import FUTURE_FRAMES, RoundSampler
+from manipnet_tools.training.train import Trainer, train
+from manipnet_tools.training.trained import save_bundle
 
 HAND = shipped_hand()
 LAYOUT = layout_of(HAND)
@@ -31,7 +36,7 @@ TINY = TrainConfig(width=24, rounds=2, epochs_per_round=2, batch=32, roll_out_ti
 
 
 @pytest.fixture(scope="module")
-def tracks(tmp_path_factory):
+def hands(tmp_path_factory):
     """A hand that closes and opens in step with its distance to a ball, and one that does so mirrored."""
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.04)
     shape = build_shape(closed_mesh(ball.vertices, ball.faces, "ball"), tmp_path_factory.mktemp("cache"))
@@ -41,50 +46,50 @@ def tracks(tmp_path_factory):
     wrist = np.stack([np.concatenate([[0.0, 1.0, 0.1 * s], quat_exp(np.array([0.0, 0.2 * s, 0.0]))]) for s in closed])
     obj = np.tile([0.1, 0.97, 0.0, 0.0, 0.0, 0.0, 1.0], (FRAMES, 1))
     other = np.tile([0.5, 1.0, 0.0], (FRAMES, 1))
-    return [HandTrack(f"take{k}/right", HAND, shape, bool(k), wrist, other, obj, angles) for k in range(2)]
+    return [CapturedHand(f"take{k}/right", HAND, shape, bool(k), wrist, other, obj, angles) for k in range(2)]
 
 
 @pytest.fixture(scope="module")
-def learned(tracks):
-    return train(tracks, TINY)
+def learned(hands):
+    return train(hands, TINY)
 
 
-def test_a_track_played_backwards_twice_is_itself(tracks):
-    track = tracks[0]
-    flipped = track.backwards()
-    np.testing.assert_array_equal(flipped.angles[0], track.angles[-1])
-    np.testing.assert_array_equal(flipped.backwards().wrist, track.wrist)
+def test_a_take_played_backwards_twice_is_itself(hands):
+    captured = hands[0]
+    flipped = captured.backwards()
+    np.testing.assert_array_equal(flipped.angles[0], captured.angles[-1])
+    np.testing.assert_array_equal(flipped.backwards().wrist, captured.wrist)
     frames = np.array([200, 300])
     np.testing.assert_allclose(
-        flipped.windows(frames).object[:, ::-1], track.windows(FRAMES - 1 - frames).object, atol=1e-12
+        flipped.windows(frames).object[:, ::-1], captured.windows(FRAMES - 1 - frames).object, atol=1e-12
     )
 
 
-def test_frames_behind_the_share_are_never_learned_from(tracks):
+def test_frames_behind_the_share_are_never_learned_from(hands):
     """Samples are the same whatever the unseen rest of a take looks like."""
     share = 0.6
     last = int(FRAMES * share)
-    torn = [replace(track, angles=track.angles.copy(), wrist=track.wrist.copy()) for track in tracks]
-    for track in torn:
-        track.angles[last:] = HAND.limits[:, 0]
-        track.wrist[last:, :3] += 1.0
+    torn = [replace(captured, angles=captured.angles.copy(), wrist=captured.wrist.copy()) for captured in hands]
+    for captured in torn:
+        captured.angles[last:] = HAND.limits[:, 0]
+        captured.wrist[last:, :3] += 1.0
     config = replace(TINY, warp=0.0)
     assert last > 2 * FUTURE_FRAMES
-    ours, theirs = (Lessons(of, config, share).next_round(None) for of in (tracks, torn))
+    ours, theirs = (RoundSampler(of, config, share).next_round(None) for of in (hands, torn))
     np.testing.assert_array_equal(ours.inputs, theirs.inputs)
     np.testing.assert_array_equal(ours.outputs, theirs.outputs)
 
 
-def test_a_model_learns(tracks):
-    lessons = Lessons(tracks, TINY, 1.0)
-    samples = lessons.next_round(None)
+def test_a_model_learns(hands):
+    sampler = RoundSampler(hands, TINY, 1.0)
+    samples = sampler.next_round(None)
     torch.manual_seed(0)
-    learner = Learner(HAND, samples, replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0))
-    assert learner.learn(samples) < 0.5, "squared deviations, of which a constant answer leaves one"
+    trainer = Trainer(HAND, samples, replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0))
+    assert trainer.learn(samples) < 0.5, "squared deviations, of which a constant answer leaves one"
 
 
-def test_training_is_the_same_for_the_same_seed(tracks, learned):
-    again, other = train(tracks, TINY), train(tracks, replace(TINY, seed=1))
+def test_training_is_the_same_for_the_same_seed(hands, learned):
+    again, other = train(hands, TINY), train(hands, replace(TINY, seed=1))
     weights, repeated, others = (
         torch.cat([p.detach().flatten() for p in of.model.parameters()]) for of in (learned, again, other)
     )
@@ -103,12 +108,12 @@ def test_a_bundle_answers_like_its_model_and_tells_its_origin(learned, tmp_path)
     assert "CC BY-NC 4.0" in bundle.meta["licence"]
 
 
-def test_a_quantised_bundle_is_smaller_and_nearly_the_same(tracks, tmp_path):
-    wide = train(tracks, replace(TINY, width=192, rounds=1, epochs_per_round=1))
+def test_a_quantised_bundle_is_smaller_and_nearly_the_same(hands, tmp_path):
+    wide = train(hands, replace(TINY, width=192, rounds=1, epochs_per_round=1))
     save_bundle(wide, tmp_path / "wide")
-    compress.run(compress.QuantiseOptions(str(tmp_path / "wide"), tmp_path / "small"))
+    quantise.run(QuantiseOptions(str(tmp_path / "wide"), tmp_path / "small"))
     ours, small = load_bundle(tmp_path / "wide"), load_bundle(tmp_path / "small")
-    rows = Lessons(tracks, TINY, 1.0).next_round(None).inputs[:64]
+    rows = RoundSampler(hands, TINY, 1.0).next_round(None).inputs[:64]
     spread = ours.infer(rows).std(axis=0).mean()
     assert np.abs(ours.infer(rows) - small.infer(rows)).mean() < 0.1 * spread + 1e-3
     sizes = [(tmp_path / name / "manipnet.onnx").stat().st_size for name in ("wide", "small")]
@@ -116,8 +121,8 @@ def test_a_quantised_bundle_is_smaller_and_nearly_the_same(tracks, tmp_path):
     assert small.meta["quantised_from_sha256"] == ours.model_hash
 
 
-def test_hidden_inputs_do_not_reach_the_network(tracks, tmp_path):
-    blind = train(tracks, replace(TINY, rounds=1, epochs_per_round=1, hidden=("ambient", "future")))
+def test_hidden_inputs_do_not_reach_the_network(hands, tmp_path):
+    blind = train(hands, replace(TINY, rounds=1, epochs_per_round=1, hidden=("ambient", "future")))
     rows = np.zeros((1, LAYOUT.input_size), np.float32)
     changed = rows + hidden_columns(LAYOUT, ("ambient", "future")) * np.float32(3.0)
     with torch.no_grad():
@@ -126,12 +131,12 @@ def test_hidden_inputs_do_not_reach_the_network(tracks, tmp_path):
         assert not torch.equal(blind.model(torch.from_numpy(rows)), blind.model(torch.from_numpy(changed)))
 
 
-def test_every_row_of_the_ablation_is_trained_once(tracks, tmp_path):
-    options = ablate.AblateOptions(tmp_path, tmp_path, training=replace(ablate.TRAINING, width=12, rounds=1))
-    ablate.train_rows(tracks, options, "fold", 1.0)
+def test_every_row_of_the_ablation_is_trained_once(hands, tmp_path):
+    options = AblateOptions(tmp_path, tmp_path, training=replace(ABLATION_TRAINING, width=12, rounds=1))
+    ablate.train_rows(hands, options, "fold", 1.0)
     written = {row: ablate.folder_of(tmp_path, row, "fold") / "bundle.json" for row in ablate.ROWS}
     stamps = {row: path.stat().st_mtime_ns for row, path in written.items()}
-    ablate.train_rows(tracks, options, "fold", 1.0)
+    ablate.train_rows(hands, options, "fold", 1.0)
     assert stamps == {row: path.stat().st_mtime_ns for row, path in written.items()}
     configs = [json.loads(path.read_text())["training"] for path in written.values()]
     assert len({(c["architecture"], *c["hidden"]) for c in configs}) == len(ablate.ROWS)

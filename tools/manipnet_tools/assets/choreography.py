@@ -5,12 +5,13 @@ Hands are directed as right hands: a left hand is given the mirror image (throug
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from manipnet.geometry import (
+    SIDES,
     Array,
+    Side,
     compose,
     invert,
     matrix_to_quat,
@@ -22,10 +23,8 @@ from manipnet.geometry import (
 )
 from manipnet_tools.assets.minimum_jerk import Move, ease, superpose, tremor
 
-Side = Literal["left", "right"]
 Vector = tuple[float, float, float]
 
-SIDES: tuple[Side, ...] = ("left", "right")
 GRIP_CENTRE_M: Vector = (0.125, 0.010, -0.058)
 """Where people have the middle of what they hold, in the wrist frame: measured on captured grasps."""
 CLEARANCE_M: Vector = (-0.045, 0.0, 0.055)

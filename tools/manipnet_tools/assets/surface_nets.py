@@ -9,7 +9,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from manipnet.geometry import Array
+
 Field = Callable[[Array], Array]
 """Signed distance at points `(n, 3)`, negative inside, as `(n,)`."""
 

@@ -15,6 +15,7 @@ from rich.text import Text
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import load_mesh
+from manipnet.tracking.tick import TICK_HZ
 from manipnet_tools.batch.job import Job, Outcome, keep
 from manipnet_tools.batch.local import run_locally
 from manipnet_tools.commands.options import BatchOptions
@@ -24,7 +25,6 @@ from manipnet_tools.terminal import open_console
 
 FILE_TAKES = (".csv", ".mcap", ".txt")
 SUMMARY = "summary.json"
-TICK_HZ = 60.0
 COLOURS = {"done": "green", "skipped": "dim", "failed": "red"}
 
 

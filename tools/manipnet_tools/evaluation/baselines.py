@@ -1,4 +1,4 @@
-"""Hands that need no network: the mean training pose, a held pose, the nearest training frame's fingers."""
+"""Hands that need no network: the mean training pose, a constant pose, the fingers of the nearest training frame."""
 
 from collections.abc import Sequence
 
@@ -13,23 +13,23 @@ from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.takes.rollout import HandInput
 
 RETRIEVE_EVERY = 3
-"""Training frames kept for retrieval: at 20 Hz neighbours are all but equal."""
+"""One training frame in this many is kept for retrieval: at 20 Hz neighbours are nearly equal."""
 
 
 def mean_pose(train: Sequence[Case]) -> Array:
-    """Mean captured joints of all training frames and both hands, `(22, 3)`."""
+    """Mean captured joints of all training frames and both hands, `(J, 3)`."""
     return np.concatenate([p for case in train for p in case.captured.values()]).mean(axis=0)
 
 
 def held(case: Case, positions: Array) -> dict[Side, Array]:
-    """One pose `(22, 3)` for every frame of both hands."""
+    """One pose `(J, 3)` for every frame of both hands."""
     return {side: np.broadcast_to(positions, captured.shape) for side, captured in case.captured.items()}
 
 
 class Retrieval:
-    """For every frame the fingers of the training frame with the nearest trajectories and surroundings.
+    """Finds for every frame the fingers of the training frame with the nearest trajectories and surroundings.
 
-    The surroundings are distances and directions from the joints of a hand that stays in the pose `hand`.
+    The surroundings are distances and directions from the joints of a hand that keeps its pose.
     """
 
     def __init__(self, train: Sequence[Case], hand: Hand, state: HandState) -> None:
@@ -47,7 +47,7 @@ class Retrieval:
         self._squares = (self._keys**2).sum(axis=1)
 
     def __call__(self, case: Case) -> dict[Side, Array]:
-        """Fingers for both hands of a case, `(T, 22, 3)` by side."""
+        """Fingers for both hands of a case, `(T, J, 3)` by side."""
         return {side: self._fingers[self._nearest(seen)] for side, seen in case.inputs.items()}
 
     def _nearest(self, seen: HandInput) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Test material: the dataset's takes at the live ticks, the captured fingers kept apart as ground truth."""
+"""Test cases: the dataset's takes at the live ticks; the captured fingers are kept apart as ground truth."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,24 +12,21 @@ from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import Shape, load_shape
 from manipnet_tools.evaluation import metrics, physics
 from manipnet_tools.evaluation.metrics import Gaps, Mask
+from manipnet_tools.takes.dataset import DataError, mesh_file, take_folders
 from manipnet_tools.takes.rollout import HandInput, Ticks, hand_inputs, tick_take
 from manipnet_tools.takes.take import Take, read_take
 
 SEEN_SHARE = 0.8
-"""Of every take, the first part that the protocol *seen* trains on; the rest is its test."""
-
-
-class DataError(ValueError):
-    """A folder that is not the dataset; the text says what is missing."""
+"""The share of every take, from its start, that the protocol *seen* trains on; it tests on the rest."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A stretch of one take: what the synthesis gets (`inputs`) and what it is judged by (all else).
+    """A stretch of one take: what the synthesis receives (`inputs`), and what its result is compared with.
 
-    `captured` joints `(T, 22, 3)` by side are in the canonical wrist frame, `needed` and `needed_paper (T, 6)`
-    the wrenches that explain the object's motion, `lifted (T,)` says where it is off the table; both are
-    derived from the whole take.
+    `captured` joints `(T, J, 3)` by side are in the canonical wrist frame. `needed` and `needed_paper (T, 6)` are the
+    wrenches that explain the object's motion, and `lifted (T,)` says where it is off the table; they are derived from
+    the whole take.
     """
 
     name: str
@@ -73,11 +70,11 @@ class Case:
         )
 
     def gaps_of(self, side: Side, positions: Array) -> Gaps:
-        """Gaps of a hand with joints `(T, 22, 3)` in the canonical wrist frame, worn on this take's wrist."""
+        """Gaps of a hand with joints `(T, J, 3)` in the canonical wrist frame, at this take's wrist."""
         return metrics.capsule_gaps(self.hand, self._in_world(side, positions), self.T_world_object, self.shape)
 
     def on_object(self, side: Side, positions: Array) -> Array:
-        """The joints of such a hand in the object's frame, `(T, 22, 3)`."""
+        """The joints of such a hand in the object's frame, `(T, J, 3)`."""
         return geometry.transform(geometry.invert(self.T_world_object)[:, None], self._in_world(side, positions))
 
     def _in_world(self, side: Side, positions: Array) -> Array:
@@ -86,39 +83,26 @@ class Case:
 
 
 def load_cases(data: Path, names: tuple[str, ...] = ()) -> list[Case]:
-    """All takes of the dataset folder (or those named) with the meshes in `meshes/`; raises `DataError`."""
-    return [load_case(read_take(folder), data / "meshes") for folder in data_folders(data, names)]
+    """All takes of the dataset, or those named, with their meshes. Raises `DataError`."""
+    return [load_case(read_take(folder), data) for folder in take_folders(data, names)]
 
 
-def data_folders(data: Path, names: tuple[str, ...] = ()) -> list[Path]:
-    """The takes `data/BVH/<take>/`, all or those named; raises `DataError`."""
-    folders = sorted(path for path in (data / "BVH").glob("*") if path.is_dir())
-    if not folders:
-        raise DataError(f"{data}: no takes; expected folders BVH/<take>/ with the dataset's BVH files")
-    found = {path.name: path for path in folders}
-    unknown = set(names) - found.keys()
-    if unknown:
-        raise DataError(f"{data}: no take {sorted(unknown)}; there are {sorted(found)}")
-    return [found[name] for name in names or found]
-
-
-def load_case(take: Take, meshes: Path) -> Case:
-    """One take on the object it handles, whose mesh is `meshes/<object>.obj`; raises `DataError`."""
+def load_case(take: Take, data: Path) -> Case:
+    """One take of the dataset with the object that it handles. Raises `DataError`."""
     if len(take.objects) != 1 or set(take.fingers) != set(SIDES):
-        raise DataError(f"{take.name}: needs one object and both hands' fingers, has {list(take.objects)}")
-    path = meshes / f"{take.objects[0]}.obj"
-    if not path.is_file():
-        raise DataError(f"{take.name}: no mesh {path}")
-    subject, shape, ticks = shipped_hand(), load_shape(path), tick_take(take)
-    body, T_world_object = physics.body_of(shape), ticks.bodies[take.objects[0]].poses
+        objects = ", ".join(take.objects) or "none"
+        raise DataError(f"{take.name}: needs one object and the fingers of both hands; its objects are {objects}")
+    name = take.objects[0]
+    subject, shape, ticks = shipped_hand(), load_shape(mesh_file(data, name)), tick_take(take)
+    body, T_world_object = physics.body_of(shape), ticks.bodies[name].poses
     world: dict[Side, Array] = {side: captured_at(take, side, ticks.time_s) for side in SIDES}
     return Case(
         take.name,
         subject,
-        take.objects[0],
+        name,
         shape,
         ticks,
-        hand_inputs(ticks, {take.objects[0]: shape}),
+        hand_inputs(ticks, {name: shape}),
         {side: _in_wrist(side, p, ticks.bodies[f"{side}_wrist"].poses) for side, p in world.items()},
         {side: metrics.capsule_gaps(subject, p, T_world_object, shape) for side, p in world.items()},
         physics.wrench_needed(T_world_object, body),
@@ -129,7 +113,7 @@ def load_case(take: Take, meshes: Path) -> Case:
 
 
 def captured_at(take: Take, side: Side, time_s: Array) -> Array:
-    """Captured joints in the world `(T, 22, 3)` at times from the take's first frame, interpolated."""
+    """Captured joints in the world `(T, J, 3)`, interpolated at times from the take's first frame."""
     positions = take.fingers[side].positions
     flat = positions.reshape(len(take.time_s), -1)
     at = take.time_s - take.time_s[0]

@@ -1,56 +1,31 @@
-"""`manipnet evaluate`: roll-outs on held-out takes, beside captured fingers and hands without a network."""
+"""`manipnet evaluate`: roll-outs on held-out takes, compared with captured fingers and with hands without a network."""
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
-from manipnet.synthesis.model.providers import DEFAULT_MODEL
 from manipnet_tools.evaluation import report
-from manipnet_tools.evaluation.cases import data_folders, load_cases
-from manipnet_tools.evaluation.results import (
-    Fold,
-    Protocol,
-    row_name,
-)
+from manipnet_tools.evaluation.cases import load_cases
+from manipnet_tools.evaluation.options import EvaluateOptions, Sweep
+from manipnet_tools.evaluation.results import Fold, row_name
 from manipnet_tools.evaluation.roll_outs import evaluate, folds
+from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.terminal import open_console
-
-Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
-
-
-@dataclass(frozen=True)
-class EvaluateOptions:
-    """Judge models on the dataset's takes: tables in the terminal, and JSON and plots where asked for."""
-
-    data: Path
-    """The dataset's folder, with BVH/ and meshes/."""
-    model: tuple[str, ...] = (DEFAULT_MODEL,)
-    """For --protocol seen: bundles trained on the first 80 % of every take, by shipped name or folder."""
-    models_dir: tuple[Path, ...] = (Path("unseen"),)
-    """For --protocol unseen: folders of bundles, each bundle named by the take left out of its training. Those that
-    are missing are trained, which takes long, and kept there."""
-    protocol: Protocol = "seen"
-    """seen: the last 20 % of every take. unseen: every take with a model that has not seen its object."""
-    solver: tuple[str, ...] = ("least_squares", "none")
-    """Solvers to test each model with."""
-    takes: tuple[str, ...] = ()
-    """Test only these takes; all by default."""
-    sweep: Sweep | None = None
-    """Instead: how the last 20 % bears noise, a shorter look-ahead, other meshes, other sizes, ten minutes."""
-    json: Path | None = None
-    """Write every figure to this file."""
-    plots: Path | None = None
-    """Write plots and pictures of the worst frames into this folder."""
 
 
 def run(options: EvaluateOptions) -> None:
-    """Evaluate, print the tables, write what was asked for. Raises `DataError` and `BundleError`."""
+    """Evaluate, print the tables and write the requested files.
+
+    Raises `DataError`, `TakeError`, `MeshError`, `BundleError` and `UnknownSolverError`.
+    """
+    for solver in options.solver:
+        solver_named(solver)
     console = open_console(stderr=False)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
@@ -67,7 +42,7 @@ def run(options: EvaluateOptions) -> None:
 def _protocol(options: EvaluateOptions, progress: Progress) -> tuple[dict[str, Any], list[Table]]:
     models = _models(options)
     cases = load_cases(options.data)
-    takes = [folder.name for folder in data_folders(options.data, options.takes)]
+    takes = [folder.name for folder in take_folders(options.data, options.takes)]
     tests = folds(cases, options.protocol, takes)
     results = evaluate(tests, options.protocol, models, options.solver, progress)
     ours = row_name(next(iter(models)), options.solver[0])
@@ -106,10 +81,13 @@ def _models(options: EvaluateOptions) -> dict[str, Callable[[Fold], Bundle]]:
 
 
 def _left_out(folder: Path, fold: Fold, data: Path) -> Bundle:
-    """The bundle of a fold, trained first if it is not there."""
+    """The bundle of a fold, which is trained first if it does not exist."""
     if not (folder / "bundle.json").is_file():
-        from manipnet_tools.training import dataset, train
+        from manipnet_tools.training.config import TrainConfig
+        from manipnet_tools.training.dataset import load_captured_hands
+        from manipnet_tools.training.train import train
+        from manipnet_tools.training.trained import save_bundle
 
-        tracks = dataset.load_tracks(data, [case.name for case in fold.train])
-        train.save_bundle(train.train(tracks, train.TrainConfig()), folder)
+        hands = load_captured_hands(data, [case.name for case in fold.train])
+        save_bundle(train(hands, TrainConfig()), folder)
     return load_bundle(folder)

@@ -1,9 +1,9 @@
-"""How good a roll-out is: pure functions over arrays at 60 Hz.
+"""Measures of a roll-out: pure functions over arrays at 60 Hz.
 
-The measures follow the paper (section 8) where it defines them; near frames, the joint error ratio, contact
-F1 and the idle hand are this project's. Positions are metres, joints in the order of the hand; "wrist
-frame" means the canonical right hand's, so a left hand is mirrored before it comes here. A *gap* is the
-distance from a capsule's surface to the object's surface, negative inside.
+The measures follow the paper (section 8) where it defines them; near frames, the joint error ratio, contact F1 and the
+idle hand are this project's. Positions are in metres. "Wrist frame" means the canonical right hand's, so a left hand is
+mirrored before it comes here. A *gap* is the distance from a capsule's surface to the object's surface, negative
+inside.
 """
 
 from dataclasses import dataclass
@@ -15,23 +15,23 @@ from numpy.typing import NDArray
 from manipnet import geometry
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
+from manipnet.tracking.tick import TICK_HZ
 
 Mask = NDArray[np.bool_]
 
-RATE_HZ = 60.0
 SETTLE_FRAMES = 60
-"""The first second after the neutral start, which no measure counts."""
+"""The first second after the neutral start, which the measures leave out."""
 
 NEAR_M, IDLE_M, CONTACT_M = 0.03, 0.15, 0.005
 DEEP_M, SHARE_M, DRIFT_M = 0.015, 0.01, 0.03
 TOUCH_M = 0.004
 AXIS_SAMPLES = 7
 PALM_START = 0.3
-"""Palm capsules are sampled from 30 % of the way from wrist to knuckle: the rest is forearm side."""
+"""Palm capsules are sampled from 30 % of the way from wrist to knuckle on; before that the forearm begins."""
 
 
-class Surface(Protocol):
-    """What the measures need of an object: `manipnet.synthesis.objects.shape.Shape` has it."""
+class DistanceQuery(Protocol):
+    """What the measures need of an object, such as `manipnet.synthesis.objects.shape.Shape`."""
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
         """Points `(n, 3)` to distance `(n,)` negative inside, outward normal and closest point `(n, 3)`."""
@@ -40,7 +40,7 @@ class Surface(Protocol):
 
 @dataclass(frozen=True)
 class Gaps:
-    """Where each capsule is nearest the object: gap `(T, 19)`, surface point and outward normal `(T, 19, 3)`.
+    """Where each capsule is nearest the object: gap `(T, C)`, surface point and outward normal `(T, C, 3)`.
 
     Points and normals are in the object's frame.
     """
@@ -66,7 +66,7 @@ def capsule_axes(hand: Hand, positions: Array) -> Array:
     return start + fractions[:, :, None] * (end - start)
 
 
-def capsule_gaps(hand: Hand, p_world: Array, T_world_object: Array, surface: Surface) -> Gaps:
+def capsule_gaps(hand: Hand, p_world: Array, T_world_object: Array, surface: DistanceQuery) -> Gaps:
     """Gaps between the capsules of a hand and an object.
 
     `p_world (T, J, 3)` are joint positions, `T_world_object (T, 7)` the pose of the mesh frame.
@@ -99,12 +99,12 @@ def idle(captured: Gaps) -> Mask:
 
 
 def joint_error_m(positions: Array, captured: Array) -> Array:
-    """Mean distance of the 21 joints beyond the wrist, wrist frame: `(T, 22, 3)` twice to `(T,)`."""
+    """Mean distance of the joints beyond the wrist, wrist frame: `(T, J, 3)` twice to `(T,)`."""
     return np.linalg.norm(positions - captured, axis=-1)[:, 1:].mean(axis=1)
 
 
 def fingertip_error_m(hand: Hand, positions: Array, captured: Array) -> Array:
-    """Mean distance of the five fingertips, wrist frame: `(T, 22, 3)` twice to `(T,)`."""
+    """Mean distance of the fingertips, wrist frame: `(T, J, 3)` twice to `(T,)`."""
     return np.linalg.norm(positions - captured, axis=-1)[:, hand.bone_count :].mean(axis=1)
 
 
@@ -124,30 +124,30 @@ def deep_frames(gaps: Gaps) -> float:
 
 
 def contact_f1(gaps: Gaps, captured: Gaps) -> float:
-    """F1 of capsules within 5 mm of the surface against the captured hand's; nan where none touches."""
+    """F1 of capsules within 5 mm of the surface against the captured hand's; nan if none touches."""
     ours, theirs = gaps.gap < CONTACT_M, captured.gap < CONTACT_M
     total = ours.sum() + theirs.sum()
     return float(2.0 * (ours & theirs).sum() / total) if total else float("nan")
 
 
 def slide_mm_s(hand: Hand, p_object: Array, gaps: Gaps) -> float:
-    """Mean speed over the object's surface of fingertips whose capsules touch it (4 mm) in two frames on end.
+    """Mean speed over the object's surface of fingertips whose capsules touch it (4 mm) in two successive frames.
 
-    `p_object (T, 22, 3)` are joint positions in the object's frame; nan where none touches.
+    `p_object (T, J, 3)` are joint positions in the object's frame; the result is nan if none touches.
     """
     tips = np.flatnonzero(hand.capsules[:, 1] >= hand.bone_count)
     touching = gaps.gap[:, tips] < TOUCH_M
-    speed = np.linalg.norm(np.diff(p_object[:, hand.capsules[tips, 1]], axis=0), axis=-1) * RATE_HZ
+    speed = np.linalg.norm(np.diff(p_object[:, hand.capsules[tips, 1]], axis=0), axis=-1) * TICK_HZ
     held = speed[touching[1:] & touching[:-1]]
     return 1000.0 * float(held.mean()) if len(held) else float("nan")
 
 
 def smoothness_cm_s2(positions: Array, frames: Mask | None = None) -> float:
-    """Mean acceleration of the 22 joints in the wrist frame, by second differences of `(T, 22, 3)`.
+    """Mean acceleration of the joints in the wrist frame, by second differences of `(T, J, 3)`.
 
-    With `frames (T,)`, only where a frame and both its neighbours are in the mask; nan where none is.
+    With `frames (T,)`, only where a frame and both its neighbours are in the mask; nan if there is none.
     """
-    acceleration = np.linalg.norm(np.diff(positions, 2, axis=0), axis=-1) * RATE_HZ**2
+    acceleration = np.linalg.norm(np.diff(positions, 2, axis=0), axis=-1) * TICK_HZ**2
     if frames is not None:
         acceleration = acceleration[frames[:-2] & frames[1:-1] & frames[2:]]
     return 100.0 * float(acceleration.mean()) if len(acceleration) else float("nan")
@@ -157,4 +157,4 @@ def longest_drift_s(error_m: Array, threshold_m: float = DRIFT_M) -> float:
     """Longest time the joint error `(T,)` stays above 3 cm without a break."""
     above = np.concatenate([[False], error_m > threshold_m, [False]])
     edges = np.flatnonzero(np.diff(above))
-    return float((edges[1::2] - edges[::2]).max(initial=0)) / RATE_HZ
+    return float((edges[1::2] - edges[::2]).max(initial=0)) / TICK_HZ

@@ -1,8 +1,8 @@
-"""Can the hands' contacts explain how the object moves? The paper's appendix A, non-negative least squares.
+"""Whether the hands' contacts explain how the object moves: the paper's appendix A, by non-negative least squares.
 
-Everything is in the object's own axes, SI units, mass 1 kg: a contact may push with any non-negative mix of
-the four edges of its friction cone, and the pushes must add up to the object's acceleration minus gravity,
-and their torques about the centre of mass to its change of angular momentum.
+Everything is in the object's own axes, in SI units, for a mass of 1 kg. A contact may push with any non-negative mix of
+the four edges of its friction cone. The pushes must add up to the object's acceleration minus gravity, and their
+torques about the centre of mass to its change of angular momentum.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,8 @@ from scipy.spatial import ConvexHull
 from manipnet import geometry
 from manipnet.geometry import Array
 from manipnet.synthesis.objects.shape import Shape
-from manipnet_tools.evaluation.metrics import RATE_HZ, Gaps, Mask
+from manipnet.tracking.tick import TICK_HZ
+from manipnet_tools.evaluation.metrics import Gaps, Mask
 
 GRAVITY_M_S2 = 9.81
 FRICTION = 0.35
@@ -24,11 +25,11 @@ LIFTED_M = 0.02
 
 @dataclass(frozen=True)
 class Rule:
-    """What counts as a contact and as explained.
+    """What counts as a contact, and as explained.
 
-    Capsules with a gap below `contact_m` push; torques are divided by `lever_m` to weigh like forces;
-    derivatives come from a cubic fitted over `fit_frames` (3: plain finite differences); a remainder below
-    `tolerance_m_s2` is explained.
+    Capsules with a gap below `contact_m` push. Torques are divided by `lever_m` so that they weigh like forces.
+    Derivatives come from a cubic fitted over `fit_frames` (3: plain finite differences). Motion is explained if the
+    remainder is below `tolerance_m_s2`.
     """
 
     contact_m: float
@@ -39,7 +40,7 @@ class Rule:
 
 RULE = Rule(contact_m=0.004, lever_m=0.05, tolerance_m_s2=0.1 * GRAVITY_M_S2, fit_frames=15)
 PAPER = Rule(contact_m=0.0, lever_m=1.0, tolerance_m_s2=0.01, fit_frames=3)
-"""Appendix A to the letter: colliders must overlap, and next to nothing may stay unexplained."""
+"""Appendix A to the letter: colliders must overlap, and almost nothing may remain unexplained."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def lifted(T_world_object: Array, body: Body) -> Mask:
 
 def wrench_needed(T_world_object: Array, body: Body, rule: Rule = RULE) -> Array:
     """Force and torque / lever the contacts must supply, `(T, 7)` to `(T, 6)`, object axes, m/s²."""
-    quats = _continuous(T_world_object[:, 3:])
+    quats = geometry.continuous_quats(T_world_object[:, 3:])
     q_inverse = geometry.quat_conjugate(geometry.quat_normalize(_derivative(quats, 0, rule)))
     # In body axes q' = q w / 2, so w = 2 q* q'; differentiating once more leaves the vector part of 2 q* q''.
     velocity = 2.0 * geometry.quat_multiply(q_inverse, _derivative(quats, 1, rule))[:, :3]
@@ -79,14 +80,8 @@ def wrench_needed(T_world_object: Array, body: Body, rule: Rule = RULE) -> Array
 
 def _derivative(values: Array, order: int, rule: Rule) -> Array:
     degree = min(3, rule.fit_frames - 1)
-    fitted = savgol_filter(values, rule.fit_frames, degree, deriv=order, delta=1.0 / RATE_HZ, axis=0)
+    fitted = savgol_filter(values, rule.fit_frames, degree, deriv=order, delta=1.0 / TICK_HZ, axis=0)
     return np.asarray(fitted, dtype=np.float64)
-
-
-def _continuous(q: Array) -> Array:
-    """The same rotations with no sign flips between neighbours."""
-    flips = np.where((q[1:] * q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
-    return q * np.cumprod(np.concatenate([[1.0], flips]))[:, None]
 
 
 def cone_wrenches(point: Array, normal: Array, body: Body, rule: Rule = RULE) -> Array:
@@ -101,7 +96,7 @@ def cone_wrenches(point: Array, normal: Array, body: Body, rule: Rule = RULE) ->
 
 
 def residuals(hands: list[Gaps], wrench: Array, body: Body, rule: Rule = RULE) -> Array:
-    """What the contacts of all hands together leave unexplained of `wrench (T, 6)`, m/s², `(T,)`."""
+    """The part of `wrench (T, 6)` that the contacts of all hands together leave unexplained, m/s², `(T,)`."""
     gap = np.concatenate([hand.gap for hand in hands], axis=1)
     point = np.concatenate([hand.point for hand in hands], axis=1)
     normal = np.concatenate([hand.normal for hand in hands], axis=1)
@@ -114,5 +109,5 @@ def residuals(hands: list[Gaps], wrench: Array, body: Body, rule: Rule = RULE) -
 
 
 def explained_share(residual: Array, frames: Mask, rule: Rule = RULE) -> float:
-    """Share of the masked frames whose motion the contacts explain; nan where the mask is empty."""
+    """Share of the masked frames whose motion the contacts explain; nan if the mask is empty."""
     return float((residual[frames] < rule.tolerance_m_s2).mean()) if frames.any() else float("nan")

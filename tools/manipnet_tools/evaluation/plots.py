@@ -1,4 +1,4 @@
-"""Plots of an evaluation: error over time, contact strips, pictures of the worst frames."""
+"""Plots of an evaluation: the error over time, the contacts over time, and pictures of the worst frames."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +11,14 @@ from manipnet.geometry import Array, Side
 from manipnet.synthesis.hand.hand import Hand
 from manipnet_tools.evaluation import metrics
 from manipnet_tools.evaluation.cases import Case
+from manipnet_tools.evaluation.results import Results
+from manipnet_tools.evaluation.scoring import Score
 from manipnet_tools.rendering import (
     CERAMIC,
     SKIN_RIGHT,
     Camera,
     Image,
-    Solid,
+    PaintedMesh,
     beads,
     contact_sheet,
     render,
@@ -28,15 +30,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from manipnet_tools.evaluation.results import Results
-    from manipnet_tools.evaluation.scoring import Score
-
 PRESSED = (0.78, 0.16, 0.12)
 PICTURE = (420, 420)
 
 
-def write_all(results: "Results", ours: str, folder: Path) -> Iterator[Path]:
-    """Write every plot into `folder`, made if needed, and name each file when it is there."""
+def write_all(results: Results, ours: str, folder: Path) -> Iterator[Path]:
+    """Write every plot into `folder`, which is created if it does not exist; yields each file when it is written."""
     folder.mkdir(parents=True, exist_ok=True)
     for case in results.cases.values():
         hands = {name: row.hands[case.name] for name, row in results.rows.items()}
@@ -52,8 +51,8 @@ def write_all(results: "Results", ours: str, folder: Path) -> Iterator[Path]:
     yield path
 
 
-def write_sweep(name: str, rows: "dict[str, Score]", folder: Path) -> Path:
-    """Joint error and contacts at every step of a sweep, as `sweep-NAME.png` in `folder`, made if needed."""
+def write_sweep(name: str, rows: dict[str, Score], folder: Path) -> Path:
+    """Plot joint error and contacts at every step of a sweep; writes `sweep-NAME.png` into `folder` and returns it."""
     from matplotlib.figure import Figure
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -101,7 +100,7 @@ def _error_over_time(case: Case, rows: dict[str, dict[Side, Array]]) -> "Figure"
 
 
 def _contact_strips(case: Case, hands: dict[Side, Array]) -> "Figure":
-    """Per capsule and frame: grey where both touch, orange where only the captured, blue where only ours."""
+    """For each capsule and frame: grey if both hands touch, orange if only the captured one, blue if only ours."""
     figure, panels = _figure(case, 8.0)
     names = _capsule_names(case.hand)
     colors = np.array([(1, 1, 1), (0.95, 0.6, 0.1), (0.15, 0.45, 0.85), (0.55, 0.55, 0.55)])
@@ -127,8 +126,8 @@ def _capsule_names(hand: Hand) -> list[str]:
     return [name.lower().replace("_", " ") for name in names]
 
 
-def _worst_frames(results: "Results", ours: str) -> Image:
-    """Of every take and hand the frame near the object with the largest joint error: captured, then ours."""
+def _worst_frames(results: Results, ours: str) -> Image:
+    """The frame near the object with the largest joint error, of every take and hand: captured, then ours."""
     pictures: list[Image] = []
     for case in results.cases.values():
         for side, positions in results.rows[ours].hands[case.name].items():
@@ -141,7 +140,7 @@ def _worst_frames(results: "Results", ours: str) -> Image:
 
 
 def _picture(case: Case, side: Side, positions: Array, frame: int) -> Image:
-    """A hand's capsules on the object, those in contact red, seen from the thumb side."""
+    """A hand's capsules on the object, seen from the thumb side; those in contact are red."""
     T_wrist_object = geometry.compose(
         geometry.invert(case.ticks.bodies[f"{side}_wrist"].poses[frame]), case.T_world_object[frame]
     )
@@ -150,10 +149,10 @@ def _picture(case: Case, side: Side, positions: Array, frame: int) -> Image:
     if side == "left":
         vertices, faces = geometry.mirror_points(vertices), faces[:, ::-1]
     touches = case[frame : frame + 1].gaps_of(side, positions[None]).gap[0] < metrics.CONTACT_M
-    solids = [Solid(vertices, faces, CERAMIC)]
+    meshes = [PaintedMesh(vertices, faces, CERAMIC)]
     for capsule, (start, end) in enumerate(case.hand.capsules):
         radius, color = float(case.hand.radii[capsule]), PRESSED if touches[capsule] else SKIN_RIGHT
         ends = positions[[start, end]]
-        solids += [rods(ends[:1], ends[1:], radius, color), beads(ends, radius, color)]
+        meshes += [rods(ends[:1], ends[1:], radius, color), beads(ends, radius, color)]
     view = Camera.orbit(np.array([0.1, 0.0, -0.03]), 0.5, azimuth=np.radians(160), elevation=np.radians(25))
-    return render(solids, view, PICTURE)
+    return render(meshes, view, PICTURE)

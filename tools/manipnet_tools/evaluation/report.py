@@ -1,19 +1,17 @@
-"""Results of an evaluation as tables and as JSON."""
+"""The results of an evaluation as tables and as JSON."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
 from manipnet.geometry import SIDES
+from manipnet_tools.evaluation.results import CAPTURED, Results
 from manipnet_tools.evaluation.scoring import TARGETS, Score
-
-if TYPE_CHECKING:
-    from manipnet_tools.evaluation.results import Results
 
 MEASURES = {
     "ratio": ("error ratio, near", "{:.2f}", 1.0),
@@ -32,12 +30,12 @@ MEASURES = {
     "physics": ("physics, %", "{:.1f}", 100.0),
     "physics_paper": ("paper's physics, %", "{:.1f}", 100.0),
 }
-"""Of each measure: label, format, factor."""
+"""The label, format and factor of each measure."""
 MAX_COLUMNS = 8
 
 
-def tables(results: "Results", ours: str) -> Iterator[Table]:
-    """Averages of every row, the row `ours` against its targets, and `ours` per take and hand."""
+def tables(results: Results, ours: str) -> Iterator[Table]:
+    """Tables of the averages of every row, of the row `ours` against its targets, and of `ours` per take and hand."""
     averages = {name: row.average for name, row in results.rows.items()}
     yield table_of(f"{results.protocol}: averages over takes and both hands", averages)
     yield _verdicts(results, ours)
@@ -47,7 +45,7 @@ def tables(results: "Results", ours: str) -> Iterator[Table]:
 
 
 def table_of(title: str, scores: dict[str, Score]) -> Table:
-    """One column per score, evenly thinned where there are many, one line per measure."""
+    """A table with a column per score, of which every n-th is shown if there are many, and a line per measure."""
     names = list(scores)
     names = names[:: -(-len(names) // MAX_COLUMNS)]
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False)
@@ -63,7 +61,7 @@ def _cell(value: float, form: str, factor: float) -> str:
     return form.format(factor * value) if math.isfinite(value) else "-"
 
 
-def _verdicts(results: "Results", ours: str) -> Table:
+def _verdicts(results: Results, ours: str) -> Table:
     table = Table(
         "target", "bound", ours, "verdict", title=f"{results.protocol}: targets", title_justify="left", box=SIMPLE_HEAD
     )
@@ -73,10 +71,8 @@ def _verdicts(results: "Results", ours: str) -> Table:
     return table
 
 
-def verdicts(results: "Results", ours: str) -> list[dict[str, Any]]:
+def verdicts(results: Results, ours: str) -> list[dict[str, Any]]:
     """Each target of the protocol with the value of the row `ours` and whether it is met."""
-    from manipnet_tools.evaluation.results import CAPTURED
-
     score, captured = results.rows[ours].average, results.rows[CAPTURED].average
     return [
         {
@@ -96,8 +92,8 @@ def _bounds(low: float, high: float) -> str:
     return f"≥ {low:g}" if high in (1.0, math.inf) else f"{low:g} to {high:g}"
 
 
-def as_json(results: "Results", ours: str) -> dict[str, Any]:
-    """Everything measured; null where a case has no frames of a kind."""
+def as_json(results: Results, ours: str) -> dict[str, Any]:
+    """All measures as plain data; null if a case has no frames of a kind."""
     return {
         "protocol": results.protocol,
         "ours": ours,

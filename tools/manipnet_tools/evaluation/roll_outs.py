@@ -1,4 +1,4 @@
-"""What makes the rows of an evaluation: models rolled out on takes."""
+"""Makes the rows of an evaluation: models rolled out on takes, and hands that need no network."""
 
 from collections.abc import Callable, Container, Iterator, Sequence
 
@@ -9,6 +9,7 @@ from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case
+from manipnet_tools.evaluation.options import EvaluationProtocol
 from manipnet_tools.evaluation.results import (
     CAPTURED,
     HOLD,
@@ -16,7 +17,6 @@ from manipnet_tools.evaluation.results import (
     NEAREST,
     Fold,
     Hands,
-    Protocol,
     Results,
     Row,
     row_name,
@@ -25,8 +25,12 @@ from manipnet_tools.evaluation.scoring import score
 from manipnet_tools.takes.rollout import roll_out
 
 
-def folds(cases: Sequence[Case], protocol: Protocol, takes: Container[str]) -> list[Fold]:
-    """`seen`: the last fifth of every take; `unseen`: each take in turn, its object in no other. Tests `takes` only."""
+def folds(cases: Sequence[Case], protocol: EvaluationProtocol, takes: Container[str]) -> list[Fold]:
+    """The folds of a protocol, of which only `takes` are tested.
+
+    `seen` tests the last fifth of every take. `unseen` tests each take in turn and trains on the takes of other
+    objects.
+    """
     tested = [case for case in cases if case.name in takes]
     if protocol == "seen":
         train = [case.part(0.0, SEEN_SHARE) for case in cases]
@@ -36,7 +40,7 @@ def folds(cases: Sequence[Case], protocol: Protocol, takes: Container[str]) -> l
 
 def evaluate(
     folds: Sequence[Fold],
-    protocol: Protocol,
+    protocol: EvaluationProtocol,
     models: dict[str, Callable[[Fold], Bundle]],
     solvers: Sequence[str],
     progress: Progress,
@@ -84,7 +88,7 @@ def _all_hands(
 def synthesise(
     bundle: Bundle, solver: str, cases: Sequence[Case], advance: Callable[[int], None] = lambda n: None
 ) -> list[Hands]:
-    """Roll out both hands of all cases from the neutral pose: joints in the canonical wrist frame."""
+    """Roll out both hands of all cases from the neutral pose; returns joints in the canonical wrist frame."""
     inputs = [case.inputs for case in cases]
     motions = iter(roll_out(Synthesizer(bundle, solver), [seen for of in inputs for seen in of.values()], advance))
     return [{side: next(motions).positions for side in of} for of in inputs]

@@ -1,4 +1,4 @@
-"""Scores of hands on a test case, their averages, and what they must reach."""
+"""Scores of hands on a test case, their averages, and the targets."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -12,11 +12,11 @@ from manipnet_tools.evaluation.cases import Case
 
 @dataclass(frozen=True)
 class Score:
-    """Measures of one hand on one case; not a number where a case has no such frames.
+    """Measures of one hand on one case; nan if the case has no such frames.
 
-    `ratio` is the joint error over the mean training pose's on frames near the object, `near_mm` that error;
-    `smoothness_ratio` and `idle_ratio` compare with the captured fingers on the same frames. The two physics
-    shares count both hands together.
+    `ratio` is the joint error relative to the mean training pose's, on frames near the object; `near_mm` is that error.
+    `smoothness_ratio` and `idle_ratio` are relative to the captured fingers on the same frames. The two physics shares
+    count both hands together.
     """
 
     ratio: float
@@ -37,9 +37,9 @@ class Score:
 
 
 def score(case: Case, mean_pose: Array, hands: dict[Side, Array]) -> dict[Side, Score]:
-    """Judge `hands`, joints `(T, 22, 3)` by side in the canonical wrist frame, without the first second.
+    """Score `hands`, joints `(T, J, 3)` by side in the canonical wrist frame, without the first second.
 
-    `mean_pose (22, 3)` is the training data's, against which `ratio` measures.
+    `mean_pose (J, 3)` is the training data's, to which `ratio` is relative.
     """
     counts = metrics.settled(len(case))
     gaps = {side: case.gaps_of(side, positions) for side, positions in hands.items()}
@@ -101,7 +101,7 @@ def _finite(values: list[float]) -> Array:
 
 @dataclass(frozen=True)
 class Target:
-    """A bound on one measure, or on its difference to the captured fingers', ends included."""
+    """Bounds, ends included, on one measure or on its difference from the captured fingers'."""
 
     measure: str
     text: str
@@ -110,12 +110,12 @@ class Target:
     over_captured: bool = False
 
     def value(self, ours: Score, captured: Score) -> float:
-        """The number the bounds are about."""
+        """The number that must be within the bounds."""
         own = getattr(ours, self.measure)
         return own - getattr(captured, self.measure) if self.over_captured else own
 
     def met(self, ours: Score, captured: Score) -> bool:
-        """Whether the bounds hold; a measure without frames does not."""
+        """Whether the bounds hold; they do not for a measure without frames."""
         return bool(self.low <= self.value(ours, captured) <= self.high)
 
 
@@ -140,4 +140,4 @@ TARGETS = {
         Target("idle_ratio", "idle hands, smoothness over the captured", 0.0, 1.0),
     ),
 }
-"""What the product promises, as averages over takes and both hands, with inverse kinematics."""
+"""The targets of the product, for averages over takes and both hands, with inverse kinematics."""

@@ -1,7 +1,7 @@
-"""`manipnet evaluate --sweep NAME`: how the hands bear what a live session does to their input.
+"""`manipnet evaluate --sweep NAME`: how the hands change with what a live session does to their input.
 
-Each sweep changes what the synthesis gets and judges the result by the unchanged take, on the last 20 % of it.
-Only `scale` changes the judgement too: a larger object has other gaps, inertia and table height.
+Each sweep changes the input of the synthesis and compares the result with the unchanged take, on its last 20 %. Only
+`scale` changes the comparison too, because a larger object has other gaps, another inertia and another table height.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,44 +17,46 @@ from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Synthesizer
-from manipnet_tools.evaluation import baselines, metrics, physics
-from manipnet_tools.evaluation.cases import SEEN_SHARE, Case, data_folders, load_case
+from manipnet.tracking.tick import TICK_HZ
+from manipnet_tools.evaluation import baselines, physics
+from manipnet_tools.evaluation.cases import SEEN_SHARE, Case, load_case
 from manipnet_tools.evaluation.roll_outs import synthesise
 from manipnet_tools.evaluation.scoring import Score, average, score
+from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.takes.rollout import HandInput, hand_inputs, roll_out, tick_take
 from manipnet_tools.takes.take import BodyTrack, Take, read_take
 
 Change = Callable[[Take, Case], Case]
-"""From a take and its case to the case with other input, of the same length."""
+"""From a take and its case to a case of the same length with other input."""
 
 LOOP_S = 600.0
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A take to be tested and its case."""
+    """A take that is tested, and its case."""
 
     take: Take
     case: Case
 
 
 def load_subjects(data: Path, names: tuple[str, ...] = ()) -> list[Subject]:
-    """The takes of the dataset folder with their cases; raises `cases.DataError`."""
-    takes = [read_take(folder) for folder in data_folders(data, names)]
-    return [Subject(take, load_case(take, data / "meshes")) for take in takes]
+    """The takes of the dataset folder with their cases. Raises `DataError`."""
+    takes = [read_take(folder) for folder in take_folders(data, names)]
+    return [Subject(take, load_case(take, data)) for take in takes]
 
 
 def hand_ticks(name: str, subjects: list[Subject]) -> int:
-    """How many hand-ticks a sweep takes."""
+    """The number of hand-ticks of a sweep."""
     if name == "loop":
-        return 2 * int(LOOP_S * metrics.RATE_HZ)
+        return 2 * int(LOOP_S * TICK_HZ)
     return 2 * len(CHANGES[name]) * sum(len(subject.case.part(SEEN_SHARE, 1.0)) for subject in subjects)
 
 
 def sweep(
     name: str, subjects: list[Subject], bundle: Bundle, solver: str, advance: Callable[[int], None]
 ) -> Iterator[tuple[str, Score]]:
-    """Each step of a sweep with the average score over the takes and hands; `loop` only takes the first take."""
+    """Each step of a sweep with the average score over takes and hands; `loop` uses only the first take."""
     mean = baselines.mean_pose([subject.case.part(0.0, SEEN_SHARE) for subject in subjects])
     if name == "loop":
         yield from _loop(subjects[0].case.part(SEEN_SHARE, 1.0), mean, bundle, solver, advance)
@@ -84,7 +86,7 @@ def _shaken(track: BodyTrack, position_m: float, angle_rad: float, rng: np.rando
 
 
 def look_ahead(seconds: float) -> Change:
-    """A future that is forecast from `seconds` on."""
+    """The future is forecast from `seconds` on."""
     return lambda take, case: replace(case, inputs=_inputs(take, case, seconds))
 
 
@@ -94,7 +96,7 @@ def _inputs(take: Take, case: Case, look_ahead_s: float = 0.5) -> dict[Side, Han
 
 
 def resolution(triangles: int) -> Change:
-    """The object's mesh with about this many triangles."""
+    """The object's mesh has about this many triangles."""
 
     def change(take: Take, case: Case) -> Case:
         shape = remeshed(case.shape, triangles)
@@ -123,7 +125,7 @@ def remeshed(shape: Shape, triangles: int) -> Shape:
 
 
 def scale(factor: float) -> Change:
-    """The object `factor` times as large about its own origin, the hands where they were."""
+    """The object is `factor` times as large about its own origin; the hands stay where they were."""
 
     def change(take: Take, case: Case) -> Case:
         mesh = case.shape.mesh
@@ -155,24 +157,24 @@ CHANGES: dict[str, dict[str, Change]] = {
 def _loop(
     case: Case, mean: Array, bundle: Bundle, solver: str, advance: Callable[[int], None]
 ) -> Iterator[tuple[str, Score]]:
-    """Ten minutes of one case played to and fro without a restart, scored pass by pass."""
-    there_and_back = 2 * len(case)
-    frames = int(LOOP_S * metrics.RATE_HZ)
+    """Ten minutes of one case, played forwards and backwards without a restart, and scored pass by pass."""
+    both_ways = 2 * len(case)
+    frames = int(LOOP_S * TICK_HZ)
     at = np.resize([*range(len(case)), *reversed(range(len(case)))], frames)
-    forth = np.resize([True] * len(case) + [False] * len(case), frames)
-    inputs = [to_and_fro(seen, at, forth) for seen in case.inputs.values()]
+    forwards = np.resize([True] * len(case) + [False] * len(case), frames)
+    inputs = [forwards_and_backwards(seen, at, forwards) for seen in case.inputs.values()]
     motions = roll_out(Synthesizer(bundle, solver), inputs, advance)
-    for start in range(0, frames - len(case), there_and_back):
+    for start in range(0, frames - len(case), both_ways):
         positions = [motion.positions[start : start + len(case)] for motion in motions]
         hands = dict(zip(case.inputs, positions, strict=True))
-        yield f"from {start / metrics.RATE_HZ:.0f} s", average(score(case, mean, hands).values())
+        yield f"from {start / TICK_HZ:.0f} s", average(score(case, mean, hands).values())
 
 
-def to_and_fro(seen: HandInput, at: np.ndarray, forth: np.ndarray) -> HandInput:
-    """The ticks `at (n,)` of an input; where not `forth (n,)`, time runs backwards."""
+def forwards_and_backwards(seen: HandInput, at: np.ndarray, forwards: np.ndarray) -> HandInput:
+    """The ticks `at (n,)` of an input; time runs backwards where `forwards (n,)` is false."""
 
     def play(windows: Array) -> Array:
-        return np.where(forth[:, None, None], windows[at], windows[at, ::-1])
+        return np.where(forwards[:, None, None], windows[at], windows[at, ::-1])
 
     return replace(
         seen,

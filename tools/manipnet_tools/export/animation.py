@@ -12,11 +12,11 @@ from manipnet.geometry import Array, Side, mirror_points, quat_conjugate, quat_m
 from manipnet.recording.mcap_file import read_hands
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
+from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import SIDES, HandsMessage
 from manipnet_tools.takes.meshes import recorded_meshes
 from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
 
-TICK_HZ = 60.0
 PAUSE_S = 10.0
 """A recording whose sender's time jumps back, or on by more than this, goes on with another animation."""
 

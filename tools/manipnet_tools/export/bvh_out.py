@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from manipnet.geometry import Array, mirror_points, mirror_quats
 from manipnet.synthesis.hand.hand import Hand
 from manipnet_tools.export.animation import Animation, ExportError, HandTrack
+from manipnet_tools.takes.trajectory import DECIMETRE_M
 
-DECIMETRES_PER_M = 10.0
 CENTIMETRES_PER_M = 100.0
 _CHANNELS = "Yrotation Xrotation Zrotation"
 _ROOT_CHANNELS = f"CHANNELS 6 Xposition Yposition Zposition {_CHANNELS}"
@@ -25,7 +25,7 @@ def write_bvh(animation: Animation, folder: Path, right_handed: bool = False) ->
     if any(folder.glob("*.bvh")):
         raise ExportError(f"{folder}: holds BVH files already, which may be a take; give a new folder")
     folder.mkdir(parents=True, exist_ok=True)
-    space = _Space(CENTIMETRES_PER_M, False) if right_handed else _Space(DECIMETRES_PER_M, True)
+    space = _Space(CENTIMETRES_PER_M, False) if right_handed else _Space(1.0 / DECIMETRE_M, True)
     texts = {f"{side}Hand": _hand_text(hand, animation.rate_hz, space) for side, hand in animation.hands.items()}
     for name, body in animation.objects.items():
         texts[file_stem(name)] = _object_text(file_stem(name), body.poses, animation.rate_hz, space)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manipnet import __version__
-from manipnet.geometry import MIRROR, Array, mirror_points
+from manipnet.geometry import MIRROR, Array, continuous_quats, mirror_points
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.objects.mesh import ClosedMesh
@@ -95,7 +95,7 @@ class _Scene:
 
     def _animate(self, node: int, positions: Array | None, quats: Array) -> None:
         """Keys for every frame; the node itself stands as in the first one."""
-        tracks = {"rotation": _continuous(quats)} | ({} if positions is None else {"translation": positions})
+        tracks = {"rotation": continuous_quats(quats)} | ({} if positions is None else {"translation": positions})
         for path, values in tracks.items():
             keys = values.astype(np.float32)
             sampler = {"input": self._times, "output": self._buffer.add(keys), "interpolation": "LINEAR"}
@@ -171,10 +171,3 @@ def _unit_sum(weights: Array) -> NDArray[np.float32]:
     rounded = weights.astype(np.float32)
     rounded[:, 0] = np.float32(1.0) - rounded[:, 1:].sum(axis=1, dtype=np.float32)
     return rounded
-
-
-def _continuous(quats: Array) -> Array:
-    """Quaternions `(T, 4)` of which each is on the side of the one before: no blending the long way round."""
-    flips = np.sign(np.sum(quats[1:] * quats[:-1], axis=1))
-    signs = np.cumprod(np.concatenate([[1.0], np.where(flips == 0.0, 1.0, flips)]))
-    return quats * signs[:, None]

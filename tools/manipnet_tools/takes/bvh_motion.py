@@ -4,11 +4,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from manipnet.geometry import quat_multiply
-
-Array = NDArray[np.float64]
+from manipnet.geometry import Array, quat_multiply
 
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 _CHANNELS = {f"{axis}{kind}" for axis in _AXES for kind in ("position", "rotation")}
@@ -29,7 +26,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Bvh:
+class BvhMotion:
     """Hierarchy and motion. `motion` `(T, C)`: all channels in file order, degrees and file units."""
 
     joints: tuple[Joint, ...]
@@ -53,7 +50,7 @@ class Bvh:
         return translations, rotations
 
 
-def read_bvh(path: Path | str) -> Bvh:
+def read_bvh(path: Path | str) -> BvhMotion:
     """Read a BVH file; raises `BvhError` for a malformed file and `OSError` for an unreadable one."""
     path = Path(path)
     try:
@@ -64,7 +61,7 @@ def read_bvh(path: Path | str) -> Bvh:
         frame_time_s, values = _parse_motion(motion, sum(len(joint.channels) for joint in joints))
     except BvhError as error:
         raise BvhError(f"{path}: {error}") from None
-    return Bvh(joints, frame_time_s, values)
+    return BvhMotion(joints, frame_time_s, values)
 
 
 def _parse_hierarchy(tokens: list[str]) -> tuple[Joint, ...]:

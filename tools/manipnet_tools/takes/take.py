@@ -11,19 +11,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from manipnet.geometry import mirror_points, mirror_poses, mirror_quats, quat_multiply, quat_rotate
+from manipnet.geometry import SIDES, Array, mirror_points, mirror_poses, mirror_quats, quat_multiply, quat_rotate
 from manipnet.recording.mcap_file import RecordingError, read_bodies
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire.bodies import BodyFrame
-from manipnet_tools.takes.bvh_motion import Bvh, BvhError, read_bvh
+from manipnet_tools.takes.bvh_motion import BvhError, BvhMotion, read_bvh
 from manipnet_tools.takes.motive_csv import MotiveCsvError, read_motive_csv
-from manipnet_tools.takes.trajectory import TrajectoryError, read_trajectory
+from manipnet_tools.takes.trajectory import DECIMETRE_M, TrajectoryError, read_trajectory
 
-Array = NDArray[np.float64]
-
-SIDES = ("left", "right")
-DECIMETRE_M = 0.1
 RESTART_S = 0.5
 """A time this far back is a sender that started again."""
 
@@ -168,14 +164,14 @@ def read_bvh_folder(folder: Path) -> Take:
     return Take(folder.name, rate_hz, np.arange(frames) / rate_hz, bodies, fingers)
 
 
-def _root_poses(bvh: Bvh) -> Array:
+def _root_poses(bvh: BvhMotion) -> Array:
     """Poses `(T, 7)` of the root, from left-handed decimetres to the project frame."""
-    root = Bvh(bvh.joints[:1], bvh.frame_time_s, bvh.motion[:, : len(bvh.joints[0].channels)])
+    root = BvhMotion(bvh.joints[:1], bvh.frame_time_s, bvh.motion[:, : len(bvh.joints[0].channels)])
     translations, rotations = root.local_transforms()
     return mirror_poses(np.concatenate([DECIMETRE_M * translations[:, 0], rotations[:, 0]], axis=-1))
 
 
-def _hand(path: Path, bvh: Bvh, side: str, subject: Hand) -> Fingers:
+def _hand(path: Path, bvh: BvhMotion, side: str, subject: Hand) -> Fingers:
     """World joints and bone rotations; the tips, which the files lack, come from the `subject`."""
     names = [joint.name for joint in bvh.joints]
     expected, bones = subject.joint_names[: subject.bone_count], subject.bone_count

@@ -7,15 +7,13 @@ quaternion x y z w and a position in left-handed decimetres. The object's positi
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from manipnet.geometry import mirror_poses, quat_normalize
+from manipnet.geometry import Array, mirror_poses, quat_normalize
 
-Array = NDArray[np.float64]
-
+DECIMETRE_M = 0.1
+"""The unit of length in the files of the dataset."""
 BODIES = ("object", "left_wrist", "right_wrist")
 COLUMNS = 7 * len(BODIES)
-DECIMETRE_M = 0.1
 
 
 class TrajectoryError(ValueError):

@@ -1,8 +1,8 @@
-"""Poses to train on besides the captured ones: blended away, and reached by the model itself.
+"""Poses to train on besides the captured ones: blended away from them, and reached by the model itself.
 
-Whatever pose a tick starts from, the answer is the captured next pose plus what is left of the error after one tick
-(`kept` of it): a hand that went astray is led back over a few ticks instead of being thrown back in one, which is
-what made perturbed training jitter.
+Whatever pose a tick starts from, the answer is the captured next pose plus the part of the error that may remain after
+one tick (`residual_error`). So a hand that went astray returns over a few ticks instead of jumping back in one, which
+made earlier models jitter.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,15 +12,27 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
-from manipnet_tools.training.dataset import TICK_FRAMES, HandTrack, Samples, concatenate, samples_at
+from manipnet_tools.training.dataset import TICK_FRAMES, CapturedHand, Samples, concatenate, samples_at
 
 Policy = Callable[[np.ndarray], Array]
 """From feature rows `(N, input_size)` to angles `(N, A)` inside the limits."""
 
 
-def led_back(before: Array, captured_before: Array, captured: Array, kept: float) -> Array:
+@dataclass(frozen=True)
+class AnswerRule:
+    """Which pose the network is to answer with."""
+
+    residual_error: float
+    """Share of a pose error that may remain after one tick."""
+    lead_frames: float
+    """How many captured frames the answered pose is ahead of the tick: the lag of the smoothing after the network."""
+    response: float
+    """Share of the way to the answer that a hand goes in one tick."""
+
+
+def answer(before: Array, captured_before: Array, captured: Array, residual_error: float) -> Array:
     """The answer `(N, A)` for a tick that starts at `before` while the captured hand was at `captured_before`."""
-    return captured + kept * (before - captured_before)
+    return captured + residual_error * (before - captured_before)
 
 
 def blended_poses(hand: Hand, captured: Array, pool: Array, rng: np.random.Generator) -> Array:
@@ -34,57 +46,61 @@ def blended_poses(hand: Hand, captured: Array, pool: Array, rng: np.random.Gener
     return captured + blend * (other - captured) + rng.normal(0.0, 0.02, captured.shape)
 
 
-@dataclass(frozen=True)
-class Lesson:
-    """What the network is to answer."""
-
-    kept: float
-    """Share of a pose error that may remain after one tick."""
-    lead_frames: float
-    """How far ahead of the tick the answered pose is, captured frames: what the smoothing after the network lags."""
-    response: float
-    """Share of the way to the answer that a hand goes in one tick."""
-
-
 def captured_samples(
-    track: HandTrack, frames: np.ndarray, pool: Array | None, lesson: Lesson, limits: Array, rng: np.random.Generator,
+    captured: CapturedHand,
+    frames: np.ndarray,
+    pool: Array | None,
+    rule: AnswerRule,
+    limits: Array,
+    rng: np.random.Generator,
     warp: float = 0.0,
-) -> Samples:  # fmt: skip
+) -> Samples:
     """Samples at `frames`, seen from the captured pose before or, with a `pool`, from poses blended toward it.
 
     `warp` plays time faster or slower by a factor up to `exp(±warp)`.
     """
     speed = np.exp(rng.uniform(-warp, warp, len(frames))) if warp else np.ones(len(frames))
-    captured_before = track.angles_at(frames - TICK_FRAMES * speed)
-    captured = track.angles_at(frames + lesson.lead_frames * speed)
+    captured_before = captured.angles_at(frames - TICK_FRAMES * speed)
+    captured_next = captured.angles_at(frames + rule.lead_frames * speed)
     before = captured_before
     if pool is not None:
-        before = np.clip(blended_poses(track.hand, captured_before, pool, rng), limits[:, 0], limits[:, 1])
-    after = led_back(before, captured_before, captured, lesson.kept)
-    return samples_at(track, frames, before, after, track.windows(frames, speed) if warp else None)
+        before = np.clip(blended_poses(captured.hand, captured_before, pool, rng), limits[:, 0], limits[:, 1])
+    after = answer(before, captured_before, captured_next, rule.residual_error)
+    return samples_at(captured, frames, before, after, captured.windows(frames, speed) if warp else None)
 
 
-def self_made_samples(
-    tracks: Sequence[HandTrack], spans: Sequence[tuple[int, int]], policy: Policy, starts: int, ticks: int,
-    lesson: Lesson, pool: Array, limits: Array, rng: np.random.Generator,
-) -> Samples:  # fmt: skip
-    """Samples along roll-outs of the model from `starts` random poses per track, `ticks` long (Ross et al. 2011)."""
+def on_policy_samples(
+    hands: Sequence[CapturedHand],
+    spans: Sequence[tuple[int, int]],
+    policy: Policy,
+    starts: int,
+    ticks: int,
+    rule: AnswerRule,
+    pool: Array,
+    limits: Array,
+    rng: np.random.Generator,
+) -> Samples:
+    """Samples along roll-outs of the model, `ticks` long, from `starts` random poses of each hand.
+
+    Source: Ross, Gordon and Bagnell 2011 (DAgger).
+    """
     frames = [rng.integers(low, high - TICK_FRAMES * ticks, starts) for low, high in spans]
     states = []
-    for track, at in zip(tracks, frames, strict=True):
-        before = track.angles_at(at - TICK_FRAMES)
-        states.append(np.where(rng.random((starts, 1)) < 0.5, before, blended_poses(track.hand, before, pool, rng)))
+    for captured, at in zip(hands, frames, strict=True):
+        before = captured.angles_at(at - TICK_FRAMES)
+        as_captured = rng.random((starts, 1)) < 0.5
+        states.append(np.where(as_captured, before, blended_poses(captured.hand, before, pool, rng)))
     states = [np.clip(state, limits[:, 0], limits[:, 1]) for state in states]
     parts: list[Samples] = []
     for _ in range(ticks):
-        step = [
-            samples_at(
-                t, at, s, led_back(s, t.angles_at(at - TICK_FRAMES), t.angles_at(at + lesson.lead_frames), lesson.kept)
-            )
-            for t, at, s in zip(tracks, frames, states, strict=True)
-        ]
-        parts += step
-        answers = np.split(policy(np.concatenate([p.inputs for p in step])), len(tracks))
-        states = [s + lesson.response * (a - s) for s, a in zip(states, answers, strict=True)]
+        tick = [_tick_samples(*each, rule) for each in zip(hands, frames, states, strict=True)]
+        parts += tick
+        answers = np.split(policy(np.concatenate([samples.inputs for samples in tick])), len(hands))
+        states = [s + rule.response * (a - s) for s, a in zip(states, answers, strict=True)]
         frames = [at + TICK_FRAMES for at in frames]
     return concatenate(parts)
+
+
+def _tick_samples(captured: CapturedHand, frames: np.ndarray, state: Array, rule: AnswerRule) -> Samples:
+    before, after = captured.angles_at(frames - TICK_FRAMES), captured.angles_at(frames + rule.lead_frames)
+    return samples_at(captured, frames, state, answer(state, before, after, rule.residual_error))

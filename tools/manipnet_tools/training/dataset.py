@@ -1,10 +1,11 @@
-"""Training samples: the same features as the live server's, computed at captured, perturbed and self-made poses.
+"""Captured hands, and training samples made from them by the live server's own features.
 
-A sample of tick `k` is what the server would see there (windows, sensors at the pose of tick `k - 1`) and the pose to
-answer with. Hands are kept at the capture's 120 Hz, so both halves of it serve as 60 Hz ticks.
+A sample of tick `k` is what the server would see there (trajectories, and sensors at the pose of tick `k - 1`) and the
+pose that the network should answer with. Hands keep the 120 Hz of the capture, so that every second frame, counted from
+any frame, serves as a tick at 60 Hz.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,17 +18,18 @@ from manipnet.synthesis.model.features import Windows, features, joint_distances
 from manipnet.synthesis.model.layout import WINDOW_STEP_S
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import Shape, load_shape
+from manipnet_tools.takes.dataset import mesh_file, take_folders
 from manipnet_tools.takes.take import Take, read_take
 
-RATE_HZ = 120
+CAPTURE_HZ = 120
 TICK_FRAMES = 2
 """Frames of the capture per tick of the server."""
-_WINDOW_FRAMES = round(WINDOW_STEP_S * RATE_HZ) * np.arange(-10, 11)
+_WINDOW_FRAMES = round(WINDOW_STEP_S * CAPTURE_HZ) * np.arange(-10, 11)
 
 
 @dataclass(frozen=True, eq=False)
-class HandTrack:
-    """One captured hand as the network sees it, a left hand mirrored into a right one, at 120 Hz."""
+class CapturedHand:
+    """One hand of a take as the network sees it: at 120 Hz, a left hand mirrored into a right one."""
 
     name: str
     hand: Hand
@@ -46,13 +48,16 @@ class HandTrack:
     def __len__(self) -> int:
         return len(self.wrist)
 
-    def backwards(self) -> "HandTrack":
-        """The same played from its end."""
+    def backwards(self) -> "CapturedHand":
+        """The same take played from its end."""
         flipped = {name: getattr(self, name)[::-1].copy() for name in ("wrist", "other_wrist", "object", "angles")}
         return replace(self, **flipped)
 
     def windows(self, frames: np.ndarray, speed: Array | None = None) -> Windows:
-        """Windows about `frames (N,)`, the ends of the take held; `speed (N,)` plays time faster or slower."""
+        """Windows about `frames (N,)`; the first and last frame of the take stand still beyond it.
+
+        `speed (N,)` plays time faster or slower.
+        """
         offsets = _WINDOW_FRAMES[None, :] * (np.ones((len(frames), 1)) if speed is None else speed[:, None])
         at = np.clip(frames[:, None] + offsets, 0, len(self) - 1)
         return Windows(
@@ -69,7 +74,7 @@ class HandTrack:
 
 
 def _between(values: Array, at: Array) -> Array:
-    """Linear interpolation at fractional frames; quaternions of neighbouring frames are close enough for that."""
+    """Linear interpolation at fractional frames, which is exact enough for quaternions of neighbouring frames."""
     below = np.minimum(at.astype(np.int64), len(values) - 2)
     fraction = (at - below)[..., None]
     mixed = values[below] * (1.0 - fraction) + values[below + 1] * fraction
@@ -83,10 +88,10 @@ def continuous(poses: Array) -> Array:
     return np.concatenate([poses[:, :3], continuous_quats(poses[:, 3:])], axis=1)
 
 
-def hand_tracks(take: Take, shapes: dict[str, Shape]) -> list[HandTrack]:
+def captured_hands(take: Take, shapes: dict[str, Shape]) -> list[CapturedHand]:
     """Both hands of a take with captured fingers; `shapes` by object name."""
     name, subject = take.objects[0], shipped_hand()
-    tracks = []
+    hands = []
     for side, other in (("right", "left"), ("left", "right")):
         mirrored = side == "left"
         quats = take.fingers[side].rotations
@@ -98,8 +103,8 @@ def hand_tracks(take: Take, shapes: dict[str, Shape]) -> list[HandTrack]:
         world = quat_to_matrix(quats)
         local = np.swapaxes(world[:, :1], -1, -2) @ world
         angles = angles_from_rotations(subject, local)
-        tracks.append(
-            HandTrack(
+        hands.append(
+            CapturedHand(
                 f"{take.name}/{side}",
                 subject,
                 shapes[name],
@@ -110,18 +115,19 @@ def hand_tracks(take: Take, shapes: dict[str, Shape]) -> list[HandTrack]:
                 angles,
             )
         )
-    return tracks
+    return hands
 
 
-def load_tracks(data: Path, takes: Iterable[str] | None = None) -> list[HandTrack]:
-    """All hands of the takes in `data/BVH`, with meshes from `data/meshes`, by take name."""
-    tracks = []
-    for folder in sorted((data / "BVH").iterdir()):
-        if takes is None or folder.name in set(takes):
-            take = read_take(folder)
-            shapes = {name: load_shape(data / "meshes" / f"{name}.obj") for name in take.objects}
-            tracks += hand_tracks(take, shapes)
-    return tracks
+def load_captured_hands(data: Path, takes: Sequence[str] = ()) -> list[CapturedHand]:
+    """All hands of the takes in `data/BVH`, or of those named, with meshes from `data/meshes`.
+
+    Raises `DataError`, `TakeError` and `MeshError`.
+    """
+    hands = []
+    for folder in take_folders(data, takes):
+        take = read_take(folder)
+        hands += captured_hands(take, {name: load_shape(mesh_file(data, name)) for name in take.objects})
+    return hands
 
 
 @dataclass(frozen=True)
@@ -141,11 +147,14 @@ def concatenate(parts: Sequence[Samples]) -> Samples:
 
 
 def samples_at(
-    track: HandTrack, frames: np.ndarray, before: Array, after: Array, windows: Windows | None = None
+    captured: CapturedHand, frames: np.ndarray, before: Array, after: Array, windows: Windows | None = None
 ) -> Samples:
-    """Samples of ticks at `frames (N,)`: the pose `before (N, A)` the tick is seen, `after (N, A)` is the answer."""
-    windows = track.windows(frames) if windows is None else windows
-    hand, shape = track.hand, track.shape
+    """Samples of ticks at `frames (N,)`: the server sees the pose `before (N, A)`, and `after (N, A)` is the answer.
+
+    `windows` are the trajectories about the frames, by default those at the speed of the capture.
+    """
+    windows = captured.windows(frames) if windows is None else windows
+    hand, shape = captured.hand, captured.shape
     inputs = features(hand, shape, windows, *forward_kinematics(hand, before))
     positions, rotations = forward_kinematics(hand, after)
     return Samples(inputs, pose_outputs(hand, positions, rotations, joint_distances(shape, windows, positions)))

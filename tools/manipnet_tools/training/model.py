@@ -4,15 +4,17 @@ import io
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import torch
 from torch import nn
 
+from manipnet.geometry import Array
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.model.decode import angles_from_outputs
 from manipnet.synthesis.model.layout import PRESENT, Block, Layout
-
-Architecture = Literal["manipnet", "resnet", "mlp"]
+from manipnet_tools.training.augment import Policy
+from manipnet_tools.training.config import Architecture
 
 _INPUT_FLOORS = {
     "joint_positions": 2e-3,
@@ -33,28 +35,30 @@ _CHANGE_FLOORS = {"joint_positions": 2e-4, "joint_axes": 2e-3, "distances": 2e-3
 
 @dataclass(frozen=True)
 class Normalisation:
-    """Mean and standard deviation of every column; deviations have a floor, or columns that hardly move would
-    amplify noise a thousandfold."""
+    """Mean and standard deviation of every column.
+
+    Deviations have a floor, because columns that hardly move would amplify noise a thousandfold.
+    """
 
     input_mean: np.ndarray
     input_std: np.ndarray
     output_mean: np.ndarray
     output_std: np.ndarray
-    carries_pose: bool
-    """Whether the output statistics are of the change since the pose that went in."""
+    predicts_change: bool
+    """Whether the output statistics are of the change from the pose in the inputs."""
 
 
-def normalisation(layout: Layout, inputs: np.ndarray, outputs: np.ndarray, carries_pose: bool) -> Normalisation:
+def normalisation(layout: Layout, inputs: np.ndarray, outputs: np.ndarray, predict_change: bool) -> Normalisation:
     """Statistics of samples `(N, input_size)` and `(N, output_size)`."""
     pose = layout.encoded["pose"]
-    if carries_pose:
+    if predict_change:
         outputs = outputs.copy()
         outputs[:, pose] -= inputs[:, pose]
-    floors = _CHANGE_FLOORS if carries_pose else _OUTPUT_FLOORS
+    floors = _CHANGE_FLOORS if predict_change else _OUTPUT_FLOORS
     return Normalisation(
         *_statistics(inputs, _floors(layout.input, _INPUT_FLOORS)),
         *_statistics(outputs, _floors(layout.output, floors)),
-        carries_pose,
+        predict_change,
     )
 
 
@@ -92,7 +96,7 @@ def hidden_columns(layout: Layout, names: Sequence[str]) -> np.ndarray:
 
 
 class ResidualDenseBlock(nn.Module):
-    """`a = relu(x); h = W a + b + a; c = relu(h); y = V c + d + c + a`; `dense=False` leaves out the long path."""
+    """`a = relu(x); h = W a + b + a; c = relu(h); y = V c + d + c + a`; without `dense` the long path is left out."""
 
     def __init__(self, width: int, dropout: float, dense: bool = True, residual: bool = True) -> None:
         super().__init__()
@@ -125,14 +129,14 @@ class ManipNet(nn.Module):
         architecture: Architecture = "manipnet",
         hidden: Sequence[str] = (),
     ) -> None:
-        """`hidden` names inputs the network is not to see: blocks of the layout, or `future` beyond 0.1 s."""
+        """`hidden` names inputs that the network does not see: blocks of the layout, or `future` beyond 0.1 s."""
         super().__init__()
         for name in ("input_mean", "output_mean", "output_std"):
             self.register_buffer(name, torch.from_numpy(getattr(norm, name).copy()))
         gain = 1.0 / norm.input_std
         gain[hidden_columns(layout, hidden)] = 0.0
         self.register_buffer("input_gain", torch.from_numpy(gain))
-        self.carries_pose = norm.carries_pose
+        self.predicts_change = norm.predicts_change
         self.layout = layout
         self._encoded_sizes = [columns.stop - columns.start for columns in layout.encoded.values()]
         third = width // 3
@@ -156,18 +160,31 @@ class ManipNet(nn.Module):
         return self.decoder(self.dropout(self.blocks(torch.cat(parts, dim=1))))
 
     def normalise_outputs(self, features: torch.Tensor, outputs: torch.Tensor) -> torch.Tensor:
-        """What `normalised` should have answered."""
-        return (outputs - self._carried(features) - self.output_mean) / self.output_std
+        """What `normalised` should answer for these outputs."""
+        return (outputs - self._base_pose(features) - self.output_mean) / self.output_std
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:
         """Features `(N, input_size)` to outputs `(N, output_size)`."""
-        return self.normalised(features) * self.output_std + self.output_mean + self._carried(features)
+        return self.normalised(features) * self.output_std + self.output_mean + self._base_pose(features)
 
-    def _carried(self, features: torch.Tensor) -> torch.Tensor:
+    def _base_pose(self, features: torch.Tensor) -> torch.Tensor:
+        """The pose to which a predicted change is added; zero for a model that predicts the pose itself."""
         pose, _, _ = torch.split(features, self._encoded_sizes, dim=1)
-        if not self.carries_pose:
+        if not self.predicts_change:
             pose = torch.zeros_like(pose)
         return torch.nn.functional.pad(pose, (0, self.layout.output_size - self._encoded_sizes[0]))
+
+
+def policy_of(model: ManipNet, hand: Hand, limits: Array) -> Policy:
+    """The model as a function from features to angles inside `limits (A, 2)`."""
+    model.eval()
+
+    def policy(rows: np.ndarray) -> Array:
+        with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
+            outputs = model(torch.from_numpy(rows))
+        return angles_from_outputs(hand, outputs.double().numpy(), limits)
+
+    return policy
 
 
 def export_onnx(model: ManipNet) -> bytes:

@@ -1,28 +1,26 @@
-"""Smaller model files: half-precision weights that are cast on load, and 8-bit (in wide layers 4-bit) weights."""
+"""Smaller model files: weights in half precision, cast on load; and 8-bit weights, in wide layers 4-bit ones."""
 
 import hashlib
 import json
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
-from tyro.conf import Positional
 
 from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.model.bundle import load_bundle
+from manipnet_tools.training.options import QuantiseOptions
 
 _LEAST_VALUES = 4096
 """Smaller tensors (biases, normalisation) keep full precision."""
-_STRETCH = 32
-"""Neighbouring weights, and activations, with a scale of their own; 64 and 128 let idle hands tremble more."""
+_BLOCK = 32
+"""Neighbouring weights, or activations, that share a scale; with 64 and 128 idle hands tremble more."""
 _WIDE = 1024
-"""Matrices from this size on, either way, bear 4 bits; the narrow network is a tenth farther with them."""
+"""Matrices of at least this size in both directions can take 4 bits; with them the narrow network errs a tenth more."""
 
 
 def halve_weights(content: bytes) -> bytes:
-    """The same graph with its matrices stored as float16 and cast to float32 when it is loaded."""
+    """The same graph with its matrices stored as float16; they are cast to float32 when it is loaded."""
     model = onnx.load_from_string(content)
     casts = []
     for tensor in model.graph.initializer:
@@ -40,7 +38,7 @@ def halve_weights(content: bytes) -> bytes:
 
 
 def single_precision(content: bytes) -> bytes:
-    """The graph before `halve_weights`, as far as half precision kept it: no casts, matrices as float32."""
+    """The graph before `halve_weights`, without casts; its float32 matrices have the precision that was kept."""
     model = onnx.load_from_string(content)
     stored = {tensor.name: tensor for tensor in model.graph.initializer}
     nodes = []
@@ -57,10 +55,10 @@ def single_precision(content: bytes) -> bytes:
 
 
 def quantise_weights(content: bytes) -> bytes:
-    """The same graph with 8-bit matrices, 4-bit ones where they are wide: stretches of 32 weights share a scale, and so
-    do the activations they meet, quantised to 8 bits as they come.
+    """The same graph with 8-bit matrices, and 4-bit ones where they are wide.
 
-    One scale for a whole layer's activations, as in ONNX Runtime's `quantize_dynamic`, makes idle hands tremble.
+    Blocks of 32 weights share a scale, and so do the activations that they meet, which are quantised to 8 bits at run
+    time. One scale for a whole layer's activations, as in ONNX Runtime's `quantize_dynamic`, makes idle hands tremble.
     """
     model = onnx.load_from_string(content)
     stored = {tensor.name: tensor for tensor in model.graph.initializer}
@@ -70,7 +68,7 @@ def quantise_weights(content: bytes) -> bytes:
             weights = numpy_helper.to_array(stored.pop(node.input[1]))
             outputs, inputs = weights.shape
             bits = 4 if min(outputs, inputs) >= _WIDE else 8
-            levels, scales = _in_stretches(weights, bits)
+            levels, scales = _in_blocks(weights, bits)
             names = [f"{node.input[1]}_levels", f"{node.input[1]}_scales"]
             stored |= {n: numpy_helper.from_array(v, n) for n, v in zip(names, (levels, scales), strict=True)}
             node = _in_few_bits(node, outputs, inputs, bits, names)
@@ -83,16 +81,16 @@ def quantise_weights(content: bytes) -> bytes:
     return model.SerializeToString()
 
 
-def _in_stretches(weights: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
-    """Weights `(N, K)` as levels `(N, stretches, 32)`, of which the middle one is zero, and scales `(N, stretches)`.
+def _in_blocks(weights: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarray]:
+    """Weights `(N, K)` as levels `(N, blocks, 32)`, whose middle one means zero, and scales `(N, blocks)`.
 
-    Two levels of 4 bits are in one byte, the first in its lower half.
+    A byte holds two levels of 4 bits, the first in its lower half.
     """
     outputs, inputs = weights.shape
-    stretches = -(-inputs // _STRETCH)
-    padded = np.zeros((outputs, stretches * _STRETCH), np.float32)
+    blocks = -(-inputs // _BLOCK)
+    padded = np.zeros((outputs, blocks * _BLOCK), np.float32)
     padded[:, :inputs] = weights
-    padded = padded.reshape(outputs, stretches, _STRETCH)
+    padded = padded.reshape(outputs, blocks, _BLOCK)
     # the largest weight, whatever its sign, is level 0: there is one more level below zero than above it
     largest = np.take_along_axis(padded, np.abs(padded).argmax(axis=2, keepdims=True), axis=2)
     zero = 1 << (bits - 1)
@@ -104,7 +102,7 @@ def _in_stretches(weights: np.ndarray, bits: int) -> tuple[np.ndarray, np.ndarra
 
 
 def _in_few_bits(gemm: onnx.NodeProto, outputs: int, inputs: int, bits: int, weights: list[str]) -> onnx.NodeProto:
-    """ONNX Runtime's own node for what a `Gemm` with weights `(outputs, inputs)` does."""
+    """ONNX Runtime's own node that does what a `Gemm` with weights `(outputs, inputs)` does."""
     attributes = {a.name: helper.get_attribute_value(a) for a in gemm.attribute}
     if attributes.pop("transB", 0) != 1 or any(value != 1.0 for value in attributes.values()):
         raise ValueError(f"{gemm.name}: only x Wᵀ + b can be quantised")
@@ -118,26 +116,13 @@ def _in_few_bits(gemm: onnx.NodeProto, outputs: int, inputs: int, bits: int, wei
         N=outputs,
         K=inputs,
         bits=bits,
-        block_size=_STRETCH,
+        block_size=_BLOCK,
         accuracy_level=activations_in_8_bits,
     )
 
 
-@dataclass(frozen=True)
-class QuantiseOptions:
-    """Write a bundle again with 8-bit weights, in wide layers 4-bit ones: smaller, and faster where it is wide.
-
-    Example: manipnet quantise manipnet-full --out models/manipnet-full-int8
-    """
-
-    model: Positional[str]
-    """Bundle, by shipped name or folder."""
-    out: Path
-    """Folder of the bundle to write."""
-
-
 def run(options: QuantiseOptions) -> None:
-    """Quantise a bundle. Raises `BundleError`."""
+    """Quantise a bundle and write it. Raises `BundleError`."""
     bundle = load_bundle(options.model)
     source = (bundle.folder / "manipnet.onnx").read_bytes()
     content = quantise_weights(single_precision(source))

@@ -146,6 +146,6 @@ def make_pose_kernel(correct: Callable[..., Any], name: str) -> Callable[..., No
 
 @cache
 def pose_kernel(solver: str) -> Callable[..., None]:
-    """The kernel of a solver in `solvers.SOLVERS`, compiled when it is first called. Raises `ValueError`."""
+    """The kernel of a solver in `solvers.SOLVERS`, compiled when it is first called. Raises `UnknownSolverError`."""
     module, _, function = solver_named(solver).correct.partition(":")
     return make_pose_kernel(getattr(import_module(module), function), f"pose_by_{solver}")

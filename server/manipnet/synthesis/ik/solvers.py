@@ -36,8 +36,12 @@ SOLVERS: Final = {
 DEFAULT_SOLVER: Final = "least_squares"
 
 
+class UnknownSolverError(ValueError):
+    """A solver that is not in the table; the text lists those that are."""
+
+
 def solver_named(name: str) -> Solver:
-    """The solver of this name. Raises `ValueError`."""
+    """The solver of this name. Raises `UnknownSolverError`."""
     if name not in SOLVERS:
-        raise ValueError(f"solver {name!r} is unknown; allowed are {', '.join(SOLVERS)}")
+        raise UnknownSolverError(f"solver {name!r} is unknown; allowed are {', '.join(SOLVERS)}")
     return SOLVERS[name]

@@ -1,0 +1,27 @@
+"""The folder of the ManipNet dataset: takes in `BVH/<take>/`, meshes in `meshes/`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+
+class DataError(ValueError):
+    """A folder is not the dataset's or lacks something; the text says what is missing."""
+
+
+def take_folders(data: Path, names: Sequence[str] = ()) -> list[Path]:
+    """The folders of all takes, or of those named. Raises `DataError`."""
+    folders = sorted(path for path in (data / "BVH").glob("*") if path.is_dir())
+    if not folders:
+        raise DataError(f"{data}: holds no takes; expected are folders BVH/<take>/ with the dataset's BVH files")
+    found = {path.name: path for path in folders}
+    if unknown := set(names) - found.keys():
+        raise DataError(f"{data}: has no take {', '.join(sorted(unknown))}; it has {', '.join(sorted(found))}")
+    return [found[name] for name in names or found]
+
+
+def mesh_file(data: Path, name: str) -> Path:
+    """The mesh of an object. Raises `DataError` if it does not exist."""
+    path = data / "meshes" / f"{name}.obj"
+    if not path.is_file():
+        raise DataError(f"{data}: the mesh {path} does not exist")
+    return path

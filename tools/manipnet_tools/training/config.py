@@ -1,0 +1,54 @@
+"""What is trained and how."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Architecture = Literal["manipnet", "resnet", "mlp"]
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """The recipe of a model. The defaults are those of the shipped bundles."""
+
+    width: int = 384
+    """Units of each layer; the paper has 1536."""
+    architecture: Architecture = "resnet"
+    """manipnet: the paper's residual dense blocks; resnet: plain residual blocks; mlp: neither."""
+    predict_change: bool = False
+    """Predict the change of the pose, in units of its own deviation, instead of the pose."""
+    hidden: tuple[str, ...] = ()
+    """Inputs that the network does not see: names of blocks, or `future`."""
+    dropout: float = 0.3
+    """Share of the activations that is dropped in training."""
+    rounds: int = 4
+    """How often new samples are made."""
+    epochs_per_round: int = 5
+    """Passes over the samples of a round."""
+    batch: int = 128
+    """Samples per step of the optimiser."""
+    learning_rate: float = 7e-4
+    """Step size of the optimiser at the start; it falls to a fiftieth along a cosine."""
+    weight_decay: float = 1e-2
+    """Pull of the optimiser on the weights toward zero."""
+    huber: float = 0.5
+    """Errors beyond this many deviations count by their size instead of its square; 0 squares all."""
+    weight_average: float = 0.999
+    """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
+    residual_error: float = 0.0
+    """Share of a pose error that may remain after one tick."""
+    response: float = 0.5
+    """Share of the way to the answer that a hand goes in one tick; the answer is ahead by the lag of that."""
+    captured: float = 0.3
+    """Samples at captured poses, per captured frame and round."""
+    blended: float = 0.6
+    """Samples at blended poses, per captured frame and round."""
+    on_policy: float = 0.4
+    """Samples at poses that the model itself reaches, per captured frame and round."""
+    roll_out_ticks: int = 40
+    """Length of the roll-outs that on-policy samples come from."""
+    warp: float = 0.2
+    """Time is played faster or slower by a factor up to exp of this."""
+    time_reversed: bool = False
+    """Learn every take played backwards as well."""
+    seed: int = 0
+    """Seed of every random number."""
