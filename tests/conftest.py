@@ -1,4 +1,4 @@
-"""What every test may ask for."""
+"""Fixtures that every test may use, and the markers that say what a test needs."""
 
 import os
 import queue
@@ -19,6 +19,26 @@ settings.register_profile("manipnet", deadline=None, derandomize=True)
 settings.load_profile("manipnet")
 
 PATIENCE_S = 20.0
+STARTS_PROCESSES = {"subprocess", "multiprocessing", "serving", "publishing", "browsing", "run_node"}
+"""A module that imports one of these has tests that start programs."""
+TESTS = Path(__file__).parent
+SLOW_FOLDERS = (TESTS / "tools/training", TESTS / "tools/bench")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark each test by what it needs; what needs nothing special and is not marked `slow` is `quick`."""
+    for item in items:
+        fixtures, module = getattr(item, "fixturenames", ()), getattr(item, "module", None)
+        if item.path.is_relative_to(TESTS / "clients"):
+            item.add_marker("client")
+        if any(map(item.path.is_relative_to, SLOW_FOLDERS)):
+            item.add_marker("slow")
+        if "manipnet_data" in fixtures:
+            item.add_marker("dataset")
+        if "stage" in fixtures or STARTS_PROCESSES & vars(module).keys():
+            item.add_marker("process")
+        if not {"client", "dataset", "process", "slow"} & {marker.name for marker in item.iter_markers()}:
+            item.add_marker("quick")
 
 
 @pytest.fixture(scope="session")

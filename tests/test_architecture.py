@@ -33,6 +33,7 @@ MAX_ROOT_MODULES = {SERVER: 6, TOOLS: 4}
 HEAVY = {"tyro", "viser", "rich", "torch", "mcap", "matplotlib", "onnx", "ray"}
 """Libraries that the tick path must not load."""
 MAY_BE_HEAVY = {"page", "recording", "demo"}
+VERSION = "manipnet.__version__"
 UNSAFE = {"pickle", "shelve", "marshal", "dill", "cloudpickle", "joblib"}
 """Libraries whose readers run code that the data names."""
 
@@ -92,11 +93,14 @@ def dotted(path: Path) -> str:
 
 
 def file_graph() -> dict[str, set[str]]:
-    """Which files of server and tools each file imports."""
+    """Which files of server and tools each file imports.
+
+    The version is left out: it lies in the public API's file, which imports from everywhere, but only on first use.
+    """
     known = {dotted(path) for path in [*modules(SERVER), *modules(TOOLS)]}
     graph: dict[str, set[str]] = {}
     for path in [*modules(SERVER), *modules(TOOLS)]:
-        names = {name if name in known else name.rpartition(".")[0] for name in imported(path)}
+        names = {name if name in known else name.rpartition(".")[0] for name in imported(path) - {VERSION}}
         graph[dotted(path)] = (names & known) - {dotted(path)}
     return graph
 

@@ -1,12 +1,25 @@
 """The harnesses of the clients in other languages."""
 
 import functools
+import json
 
 import pytest
+from checkout import run_folder
+from filelock import FileLock
 from languages import build
 
 
 @pytest.fixture(scope="session")
 def harness(tmp_path_factory):
-    """By name, the command of a language's client; each is built once."""
-    return functools.cache(lambda name: build(name, tmp_path_factory.mktemp(name)))
+    """Returns the command of a language's client by name. Each client is built once in a test run, by one worker."""
+
+    def built(name: str) -> list[str]:
+        folder = run_folder(tmp_path_factory) / f"harness-{name}"
+        command = folder / "command.json"
+        with FileLock(f"{folder}.lock"):
+            if not command.exists():
+                folder.mkdir(exist_ok=True)
+                command.write_text(json.dumps(build(name, folder)))
+        return json.loads(command.read_text())
+
+    return functools.cache(built)

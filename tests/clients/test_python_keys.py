@@ -105,19 +105,19 @@ def test_who_is_turned_away_is_told_why(folder, tmp_path_factory):
         with Client(address, keys=folder / "unlisted.toml") as client:
             wait_for_state(client, "does not list this client's key")
         with Client(address, keys=other / "stranger.toml") as client:
-            wait_for_state(client, "is its key the one in this file")
+            wait_for_state(client, "check that its key is the one in this file")
         with Client(address) as client:
-            wait_for_state(client, "asks for CURVE; give this client `keys`")
+            wait_for_state(client, "requires CURVE; pass `keys` to this client")
 
 
 def test_a_server_without_curve_and_no_server_at_all(folder):
     with zmq.Context() as context, context.socket(zmq.PUB) as pub:
         port = pub.bind_to_random_port("tcp://127.0.0.1")
         with Client(f"tcp://127.0.0.1:{port}", keys=folder / "listed.toml") as client:
-            wait_for_state(client, "speaks no CURVE")
+            wait_for_state(client, "does not use CURVE")
         pub.unbind(f"tcp://127.0.0.1:{port}")
         with Client(f"tcp://127.0.0.1:{port}", keys=folder / "listed.toml") as client:
-            wait_for_state(client, "nobody answers")
+            wait_for_state(client, "no server answers")
 
 
 @pytest.mark.parametrize("text", [None, "", 'public = "short"'])

@@ -76,6 +76,7 @@ def seq_of(sub):
     return decode_binary(sub.recv()[len(TOPIC_BIN) :]).seq
 
 
+@pytest.mark.slow
 def test_a_subscriber_that_does_not_read_costs_the_others_nothing_and_is_bounded(publisher, context):
     with ExitStack() as opened:
         readers = [opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_BIN)) for _ in range(2)]

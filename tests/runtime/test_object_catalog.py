@@ -115,6 +115,7 @@ def test_a_file_that_breaks_is_named_and_the_shape_stays(folder: Path, content: 
     assert catalog.problems() == {}
 
 
+@pytest.mark.slow
 def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     path, done, tries = folder / "crate.ply", threading.Event(), []
     box(path, 0.05)
@@ -135,6 +136,7 @@ def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     assert len(tries) == 2
 
 
+@pytest.mark.slow
 def test_a_large_file_is_prepared_by_another_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)

@@ -1,5 +1,6 @@
-"""Where things are, which tools there are, and a publisher to read from."""
+"""The folders of the checkout and of a test run, programs that tests need, and a publisher to read from."""
 
+import os
 import shutil
 import subprocess
 import sys
@@ -14,8 +15,14 @@ CLIENTS = ROOT / "clients"
 VECTORS = ROOT / "tests" / "vectors"
 
 
+def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A temporary folder of this test run, which all workers of pytest-xdist share."""
+    base = tmp_path_factory.getbasetemp()
+    return base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+
 def need(*tools: str) -> list[str]:
-    """Paths of command line tools; skips the test where one is missing."""
+    """Paths of command line tools. Skips the test if one of them is missing."""
     missing = [tool for tool in tools if shutil.which(tool) is None]
     if missing:
         pytest.skip(f"needs {', '.join(missing)} (see clients/README.md for the Debian packages)")
@@ -24,7 +31,7 @@ def need(*tools: str) -> list[str]:
 
 @contextmanager
 def publishing(*options: str) -> Iterator[tuple[subprocess.Popen, str, str]]:
-    """A process that publishes hands; yields it, its tcp:// and its ws:// address once it listens."""
+    """Start a process that publishes hands; yields it with its tcp:// and ws:// addresses once it listens."""
     command = [sys.executable, str(Path(__file__).parent / "publisher.py"), *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:

@@ -1,4 +1,4 @@
-"""Packages of npm that tests check our files with; installed once per machine, where node is."""
+"""Runs scripts that check our files with packages of npm, which are installed once per machine."""
 
 import hashlib
 import json
@@ -9,12 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from filelock import FileLock
 
 PATIENCE_S = 180
 
 
 def run_node(script: str, *arguments: str, packages: tuple[str, ...]) -> Any:
-    """What a CommonJS `script` prints as JSON; it may require the `packages` (`name@version`). Skips without node."""
+    """Run a CommonJS `script` that may require the `packages` (`name@version`), and return the JSON that it prints.
+
+    Skips the test if node or the packages cannot be had.
+    """
     node, npm = shutil.which("node"), shutil.which("npm")
     if node is None or npm is None:
         pytest.skip("node and npm are not installed (https://nodejs.org)")
@@ -28,11 +32,13 @@ def run_node(script: str, *arguments: str, packages: tuple[str, ...]) -> Any:
 def _installed(npm: str, packages: tuple[str, ...]) -> Path:
     key = hashlib.sha256(" ".join(packages).encode()).hexdigest()[:12]
     folder = Path(tempfile.gettempdir()) / f"manipnet-npm-{key}"
-    if not folder.is_dir():
-        with tempfile.TemporaryDirectory(dir=folder.parent) as part:
-            command = [npm, "install", "--silent", "--no-audit", "--no-fund", "--prefix", part, *packages]
-            done = subprocess.run(command, cwd=part, capture_output=True, text=True, timeout=PATIENCE_S)
-            if done.returncode:
-                pytest.skip(f"npm cannot install {' '.join(packages)}: {done.stderr.strip()[-200:]}")
-            shutil.copytree(part, folder, dirs_exist_ok=True)
+    with FileLock(f"{folder}.lock"):
+        if not folder.is_dir():
+            with tempfile.TemporaryDirectory(dir=folder.parent) as part:
+                command = [npm, "install", "--silent", "--no-audit", "--no-fund", "--prefix", part, *packages]
+                done = subprocess.run(command, cwd=part, capture_output=True, text=True, timeout=PATIENCE_S)
+                if done.returncode:
+                    pytest.skip(f"npm cannot install {' '.join(packages)}: {done.stderr.strip()[-200:]}")
+                shutil.copytree(part, f"{folder}.part", symlinks=True, dirs_exist_ok=True)
+            Path(f"{folder}.part").rename(folder)
     return folder

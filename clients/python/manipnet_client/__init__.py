@@ -7,6 +7,7 @@ from collections.abc import AsyncGenerator, Generator
 from os import PathLike
 
 from .client import Client, Stats
+from .control import ControlClient, RequestError
 from .interpolation import Interpolator, Shown
 from .message import Body, Hand, Hands, MessageError, decode
 from .zmtp import parse_address
@@ -14,10 +15,12 @@ from .zmtp import parse_address
 __all__ = [
     "Body",
     "Client",
+    "ControlClient",
     "Hand",
     "Hands",
     "Interpolator",
     "MessageError",
+    "RequestError",
     "Shown",
     "Stats",
     "decode",

@@ -1,7 +1,8 @@
-"""A subscription with ZeroMQ's CURVE encryption, for a server that other machines can reach. Needs pyzmq."""
+"""Connections with ZeroMQ's CURVE encryption, for a server that other machines can reach. They need pyzmq."""
 
 from __future__ import annotations
 
+import contextlib
 import re
 import time
 from collections.abc import Iterator, Mapping
@@ -17,43 +18,52 @@ except ImportError as error:
     raise ImportError('connecting with keys needs pyzmq: pip install "manipnet-client[curve]"') from error
 
 KEYS = ("public", "secret", "server_public")
+HANDSHAKE_S = 2.0
 SLICE_MS = 50
-"""How soon a wait notices that it should end: a ZeroMQ socket cannot be closed from another thread."""
+"""How often a wait checks whether it should end, because no other thread may close a ZeroMQ socket."""
 
 HIGH_WATER_MARK = 64
-WHAT_WENT_WRONG = {
-    zmq.Event.HANDSHAKE_FAILED_AUTH: "the server does not list this client's key (its clients.allow)",
-    zmq.Event.HANDSHAKE_FAILED_PROTOCOL: "the server speaks no CURVE, or its key is not the one in this client's file",
-    zmq.Event.HANDSHAKE_FAILED_NO_DETAIL: "the server turned this client away: is its key the one in this file?",
+FAILURES = {
+    zmq.Event.HANDSHAKE_FAILED_AUTH: "the server does not list this client's key (in its clients.allow)",
+    zmq.Event.HANDSHAKE_FAILED_PROTOCOL: "the server does not use CURVE, or its key is not the one in this file",
+    zmq.Event.HANDSHAKE_FAILED_NO_DETAIL: "the server refused this client; check that its key is the one in this file",
     zmq.Event.DISCONNECTED: "the server closed the connection",
-    zmq.Event.CLOSED: "nobody answers",
+    zmq.Event.CLOSED: "no server answers",
 }
+"""The reason of each event that ends a connection."""
 
 
 def read_keys(path: str | PathLike[str]) -> dict[str, str]:
-    """The keys in the file that `manipnet keys make NAME` made; raises `ValueError` with the remedy."""
+    """The keys in the file that `manipnet keys make NAME` wrote; raises `ValueError`, whose text names the remedy."""
     try:
         text = Path(path).read_text(encoding="ascii")
     except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"cannot read {path}: {error}; `manipnet keys make NAME` on the server makes it") from None
+        raise ValueError(f"cannot read {path}: {error}; `manipnet keys make NAME` on the server writes it") from None
     found = dict(re.findall(r'^(\w+) = "([^"]{40})"$', text, re.MULTILINE))
     if missing := [key for key in KEYS if key not in found]:
-        raise ValueError(f"{path} has no {missing[0]!r} of 40 characters; `manipnet keys make NAME` makes it anew")
+        raise ValueError(
+            f"{path} has no {missing[0]!r} of 40 characters; `manipnet keys make NAME` on the server writes a new file"
+        )
     return {key: found[key] for key in KEYS}
 
 
-class SecureSubscription:
-    """As `zmtp.Subscription`, encrypted. Not thread-safe, but `interrupt` may come from anywhere."""
+class SecureConnection:
+    """An encrypted connection after its handshake. Not thread-safe, but any thread may call `interrupt`."""
 
     def __init__(
-        self, host: str, port: int, topic: bytes, max_bytes: int, keys: Mapping[str, str], timeout_s: float = 2.0
+        self,
+        host: str,
+        port: int,
+        socket_type: int,
+        max_bytes: int,
+        keys: Mapping[str, str],
+        timeout_s: float = HANDSHAKE_S,
     ) -> None:
+        """Connect as a `socket_type` (`zmq.SUB` or `zmq.REQ`); raises `OSError`."""
         self._interrupted = False
         self._context = zmq.Context()
-        self._socket = self._context.socket(zmq.SUB)
-        self._events = self._socket.get_monitor_socket(
-            zmq.Event.HANDSHAKE_SUCCEEDED | sum(WHAT_WENT_WRONG, zmq.Event(0))
-        )
+        self._socket = self._context.socket(socket_type)
+        self._events = self._socket.get_monitor_socket(zmq.Event.HANDSHAKE_SUCCEEDED | sum(FAILURES, zmq.Event(0)))
         self._poller = zmq.Poller()
         self._poller.register(self._socket, zmq.POLLIN)
         self._poller.register(self._events, zmq.POLLIN)
@@ -61,7 +71,6 @@ class SecureSubscription:
             self._configure(max_bytes, keys)
             self._socket.connect(f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
             self._handshake(timeout_s)
-            self._socket.subscribe(topic)
         except zmq.ZMQError as error:
             self.close()
             raise ZmtpError(f"cannot connect to {host}:{port}: {error}") from None
@@ -70,7 +79,7 @@ class SecureSubscription:
             raise
 
     def interrupt(self) -> None:
-        """End a waiting `batches` with `OSError`."""
+        """Make a `wait` raise `OSError`."""
         self._interrupted = True
 
     def close(self) -> None:
@@ -80,14 +89,35 @@ class SecureSubscription:
         self._socket.close(linger=0)
         self._context.term()
 
-    def batches(self) -> Iterator[list[bytes]]:
-        """All frames that have arrived by now, oldest first, again and again; empty lists while it is silent.
+    def send(self, body: bytes) -> None:
+        """Send one message."""
+        self._socket.send(body)
 
-        Raises `OSError` when the connection is lost or the other side is silent even to a ping.
+    def subscribe(self, topic: bytes) -> None:
+        """Ask for the messages that begin with `topic`."""
+        self._socket.subscribe(topic)
+
+    def receive(self) -> list[bytes] | None:
+        """The frames of the next message, or None when none has arrived."""
+        try:
+            return self._socket.recv_multipart(zmq.NOBLOCK)
+        except zmq.Again:
+            return None
+
+    def wait(self) -> bool:
+        """Wait shortly for a message or an event and return whether the handshake has just succeeded.
+
+        Raises `ZmtpError` when the connection is lost.
         """
-        while True:
-            yield self._messages()
-            self._wait()
+        ready = dict(self._poller.poll(SLICE_MS))
+        if self._interrupted:
+            raise ZmtpError("closed")
+        if self._events not in ready:
+            return False
+        event = recv_monitor_message(self._events)["event"]
+        if event in FAILURES:
+            raise ZmtpError(FAILURES[event])
+        return event == zmq.Event.HANDSHAKE_SUCCEEDED
 
     def _configure(self, max_bytes: int, keys: Mapping[str, str]) -> None:
         numbers = {
@@ -95,7 +125,7 @@ class SecureSubscription:
             zmq.RCVHWM: HIGH_WATER_MARK,
             zmq.MAXMSGSIZE: max_bytes,
             zmq.IPV6: 1,
-            zmq.RECONNECT_IVL: -1,  # the client reconnects, and says why it must
+            zmq.RECONNECT_IVL: -1,  # the caller reconnects, because only then can it report the reason
             zmq.HEARTBEAT_IVL: int(1000 * PING_AFTER_S),
             zmq.HEARTBEAT_TIMEOUT: int(1000 * DEAD_AFTER_S),
         }
@@ -105,31 +135,48 @@ class SecureSubscription:
             self._socket.setsockopt_string(option, keys[key])
 
     def _handshake(self, timeout_s: float) -> None:
-        give_up = time.monotonic() + timeout_s
-        while time.monotonic() < give_up:
-            if self._wait():
+        give_up_s = time.monotonic() + timeout_s
+        while time.monotonic() < give_up_s:
+            if self.wait():
                 return
-        raise ZmtpError("the other side does not speak ZMTP 3: it keeps silent")
+        raise ZmtpError("the other side does not speak ZMTP 3: it sends nothing")
+
+
+class SecureSubscription(SecureConnection):
+    """`zmtp.Subscription`, encrypted."""
+
+    def __init__(self, host: str, port: int, topic: bytes, max_bytes: int, keys: Mapping[str, str]) -> None:
+        """Connect and subscribe; raises `OSError`."""
+        super().__init__(host, port, zmq.SUB, max_bytes, keys)
+        self.subscribe(topic)
+
+    def batches(self) -> Iterator[list[bytes]]:
+        """Yield all messages received so far, oldest first, again and again; an empty list while none arrive.
+
+        Raises `OSError` when the connection is lost or when the other side does not even answer a ping.
+        """
+        while True:
+            yield self._messages()
+            self.wait()
 
     def _messages(self) -> list[bytes]:
-        """What has arrived. Ours have one frame; longer ones are left out."""
+        """The messages of one frame, as all of ours are; longer messages are skipped."""
         found = []
-        while True:
-            try:
-                parts = self._socket.recv_multipart(zmq.NOBLOCK)
-            except zmq.Again:
-                return found
+        while (parts := self.receive()) is not None:
             if len(parts) == 1:
                 found.append(parts[0])
+        return found
 
-    def _wait(self) -> bool:
-        """Wait for news; whether the handshake has been made. Raises `ZmtpError` when the connection is lost."""
-        ready = dict(self._poller.poll(SLICE_MS))
-        if self._interrupted:
-            raise ZmtpError("closed")
-        if self._events not in ready:
-            return False
-        event = recv_monitor_message(self._events)["event"]
-        if event in WHAT_WENT_WRONG:
-            raise ZmtpError(WHAT_WENT_WRONG[event])
-        return event == zmq.Event.HANDSHAKE_SUCCEEDED
+
+def request(host: str, port: int, body: bytes, max_bytes: int, keys: Mapping[str, str], timeout_s: float) -> bytes:
+    """`zmtp.request`, encrypted."""
+    give_up_s = time.monotonic() + timeout_s
+    with contextlib.closing(
+        SecureConnection(host, port, zmq.REQ, max_bytes, keys, min(timeout_s, HANDSHAKE_S))
+    ) as connection:
+        connection.send(body)
+        while time.monotonic() < give_up_s:
+            connection.wait()
+            if parts := connection.receive():
+                return parts[-1]
+    raise TimeoutError

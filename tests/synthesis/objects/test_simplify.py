@@ -22,6 +22,7 @@ def _rough(mesh: ClosedMesh, noise_m: float) -> ClosedMesh:
     return closed_mesh(mesh.vertices + noise, mesh.faces, "rough")
 
 
+@pytest.mark.slow
 def test_a_large_mesh_is_sensed_with_fewer_triangles_that_are_as_near_as_promised(ball: ClosedMesh, tmp_path) -> None:
     assert len(ball.faces) > MOST_TRIANGLES
     shape = build_shape(ball, tmp_path)
@@ -35,6 +36,7 @@ def test_a_large_mesh_is_sensed_with_fewer_triangles_that_are_as_near_as_promise
     np.testing.assert_array_equal(again.bvh.corners, shape.bvh.corners)
 
 
+@pytest.mark.slow
 def test_a_rough_mesh_is_sensed_as_it_is(ball: ClosedMesh) -> None:
     rough = _rough(ball, WITHIN_M)
     assert simplified(rough) is rough

@@ -103,6 +103,7 @@ class Waving:
             self._socket.send(msgpack.packb({"t": i / 240, "bodies": bodies}) or b"")
 
 
+@pytest.mark.slow
 def test_init_listens_and_writes_and_replaces_only_when_told(tmp_path: Path, capsys, monkeypatch) -> None:
     waving, path = Waving(), tmp_path / "rig.toml"
     waited = threading.Event.wait

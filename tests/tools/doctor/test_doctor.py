@@ -157,6 +157,7 @@ def test_a_server_with_keys_is_asked_with_one(ports, capsys, monkeypatch, tmp_pa
     assert "none.toml does not exist" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_bodies_that_arrive_are_compared_with_the_rig(ports, capsys):
     stop = threading.Event()
 

@@ -21,7 +21,7 @@ from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.synthesizer import hand_to_world
 from manipnet.wire import BodyPose, HandsMessage
 from manipnet_tools import cli
-from manipnet_tools.export.animation import ExportError, HandTrack, Animation, hand_track, read_performance
+from manipnet_tools.export.animation import Animation, ExportError, HandTrack, hand_track, read_performance
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf

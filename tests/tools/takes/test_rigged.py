@@ -72,6 +72,7 @@ def fingers(take: Path, out: Path, model: Path, *more: str) -> dict[str, np.ndar
         return dict(file)
 
 
+@pytest.mark.slow
 def test_a_calibrated_take_has_the_fingers_of_its_true_wrists(rig: Path, tmp_path: Path, tiny_bundle: Path) -> None:
     sized = tmp_path / "sized.toml"
     sized.write_text(f'hand_scale = {SIZE}\n[bodies]\nleft_wrist = "left_wrist"\nright_wrist = "right_wrist"\n')
