@@ -51,7 +51,7 @@ def test_the_page_comes_with_a_strict_policy(server: LiveServer) -> None:
     host = urlsplit(server.addresses["page"]).netloc
     assert policy["default-src"] == ["'none'"]
     assert policy["frame-ancestors"] == ["'none'"]
-    assert set(policy["connect-src"]) <= {"'self'", f"ws://{host}", "data:"}
+    assert set(policy["connect-src"]) <= {"'self'", f"ws://{host}", "data:", "blob:"}
     assert "'unsafe-eval'" not in policy["script-src"]
     assert "'unsafe-inline'" not in policy["script-src"]
     assert response.getheader("X-Frame-Options") == "DENY"
