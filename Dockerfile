@@ -3,18 +3,18 @@ FROM python:3.12-slim
 
 RUN useradd --create-home --uid 1000 manipnet
 WORKDIR /opt/manipnet
-COPY pyproject.toml README.md LICENSE ./
+COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY server server
 COPY tools tools
 COPY models models
-RUN pip install --no-cache-dir .
+RUN pip install --no-cache-dir -c constraints.txt .
 
 USER manipnet
 WORKDIR /home/manipnet
 ENV PYTHONUNBUFFERED=1
 EXPOSE 5555 5556 5557 39540/udp 8080 8081
 
-# inside a container the loopback is the container's own, so the server listens on all of its addresses; publish only
-# the ports you need and only to networks you trust
+# The loopback address of a container is its own, so the server listens on all of its addresses. Publish only the ports
+# that you need, and only to networks that you trust.
 ENTRYPOINT ["manipnet-serve"]
 CMD ["--demo", "--host", "0.0.0.0", "--insecure"]

@@ -53,7 +53,7 @@ def samples(true: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]
     seen, at = shaken(true, rng), np.arange(HISTORY, len(true) - AHEAD[-1])
     past = np.stack([between(seen[at - lag], seen[at]) for lag in LAGS], axis=1)
     future = np.stack([between(seen[at], true[at + ahead]) for ahead in AHEAD], axis=1)
-    times, to_come = TICK_S * np.arange(-HISTORY, 1), TICK_S * AHEAD
+    times, to_come = TICK_S * np.arange(-HISTORY, 1, dtype=float), TICK_S * AHEAD
     fading = np.stack([damped_velocity(times, np.ascontiguousarray(seen[k - HISTORY : k + 1]), to_come) for k in at])
     return past, future, between(seen[at][:, None], fading)
 

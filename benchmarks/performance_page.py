@@ -1,9 +1,11 @@
-"""All figures of docs/performance.md, measured anew: `python benchmarks/performance_page.py`, about 17 minutes.
+"""Measure all figures of docs/performance.md anew and write them into it: `python benchmarks/performance_page.py`.
 
-Run it on a machine that does nothing else. The usual sections come first and are in the page after some five minutes,
-the ten minutes of a session last. The figures in full are left in the folder it is run in.
+This takes about 17 minutes, on a machine that should do nothing else. The usual sections are written after about five
+minutes; the session of ten minutes comes last. The complete figures are written as JSON to the current folder. All
+options go to `manipnet bench`, whose `--help` lists them.
 """
 
+import argparse
 import re
 import subprocess
 import sys
@@ -14,10 +16,10 @@ from manipnet_tools.bench.sections import USUAL
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 
 
-def measure(name: str, sections: tuple[str, ...]) -> None:
-    """Run some sections of `manipnet bench` and put what it prints into its place in the page."""
+def measure(name: str, sections: tuple[str, ...], options: list[str]) -> None:
+    """Run some sections of `manipnet bench` and write its output into its place in the page."""
     command = ["manipnet", "bench", *(word for section in sections for word in ("--only", section))]
-    command += ["--json", f"bench-{name}.json", *sys.argv[1:]]
+    command += ["--json", f"bench-{name}.json", *options]
     print(" ".join(command), flush=True)
     report = subprocess.run(
         [sys.executable, "-m", "manipnet_tools.cli", *command[1:]], stdout=subprocess.PIPE, text=True, check=True
@@ -30,6 +32,12 @@ def measure(name: str, sections: tuple[str, ...]) -> None:
     )
 
 
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    _, options = parser.parse_known_args()
+    measure("usual", USUAL, options)
+    measure("minutes", ("minutes",), options)
+
+
 if __name__ == "__main__":
-    measure("usual", USUAL)
-    measure("minutes", ("minutes",))
+    main()

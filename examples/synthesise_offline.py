@@ -1,10 +1,10 @@
 """Synthesise offline: the fingers of a right hand that reaches for a mug, without a server, through the public API.
 
-    python examples/synthesise_offline.py [mug.obj]
+    python examples/synthesise_offline.py [mug]
 
 At every tick, 60 times a second, the hand sees half a second of its wrist's and the object's motion to either side of
-the present (`HandScene`), and the synthesizer takes it from its last state to the next pose. For recorded takes,
-`manipnet synthesize` does all of this.
+the present (`HandScene`), and the synthesizer steps it from its last state to its next pose. The argument is an object
+of the library or a mesh file. For recorded takes, `manipnet synthesize` does all of this.
 """
 
 import sys

@@ -14,10 +14,11 @@ ROOT = Path(__file__).parents[1]
 SERVER, TOOLS = ROOT / "server" / "manipnet", ROOT / "tools" / "manipnet_tools"
 
 LAYERS = (
-    ("wire", "telemetry", "geometry", "jit"),
+    ("wire", "common", "telemetry", "geometry", "jit"),
     ("net", "synthesis"),
-    ("inputs", "config", "tracking"),
-    ("outputs", "actors"),
+    ("inputs", "outputs", "tracking"),
+    ("config",),
+    ("actors",),
     ("runtime",),
     ("control",),
     ("recording",),

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from manipnet.inputs import INPUTS
 from manipnet.runtime.console import Console
 from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.runtime.status import SilenceWatch
-from manipnet.telemetry import LABELS, RepeatFilter, Telemetry, Timings
-from manipnet.tracking.timeline import BodyHealth
+from manipnet.telemetry import DROP_REASONS, LABELS, RepeatFilter, Telemetry, Timings
+from manipnet.tracking.tick import BodyHealth
 from manipnet.wire.bodies import BodyFrame
 
 SOURCES = sorted((Path(__file__).parents[1] / "server").rglob("*.py"))
@@ -22,6 +23,7 @@ SOURCES = sorted((Path(__file__).parents[1] / "server").rglob("*.py"))
 
 def test_counters_count_by_label_from_any_thread() -> None:
     telemetry = Telemetry()
+    telemetry.declare("frames_in", "osc")
     threads = [
         threading.Thread(target=lambda: [telemetry.count("frames_in", source="osc") for _ in range(1000)])
         for _ in range(4)
@@ -38,8 +40,18 @@ def test_counters_count_by_label_from_any_thread() -> None:
     [("frames", {"source": "osc"}), ("frames_in", {"source": "pigeon"}), ("frames_in", {"by": "osc"})],
 )
 def test_a_counter_or_label_that_is_not_declared_is_an_error(name: str, label: dict[str, str]) -> None:
+    telemetry = Telemetry()
+    telemetry.declare("frames_in", "osc")
     with pytest.raises(KeyError):
-        Telemetry().count(name, **label)
+        telemetry.count(name, **label)
+
+
+def test_what_is_declared_twice_is_one_label() -> None:
+    telemetry = Telemetry()
+    telemetry.declare("frames_dropped", "malformed", "late")
+    telemetry.declare("frames_dropped", "malformed")
+    assert telemetry.labels()["frames_dropped"] == ("reason", (*DROP_REASONS, "malformed"))
+    assert Telemetry().labels()["frames_dropped"] == ("reason", DROP_REASONS)
 
 
 def test_every_count_in_the_source_is_declared() -> None:
@@ -58,6 +70,16 @@ def test_every_count_in_the_source_is_declared() -> None:
                 assert keyword.value.value in values, f"{path.name}:{node.lineno}"
             found += 1
     assert found > 10
+
+
+def test_every_reason_for_which_a_receiver_drops_is_declared() -> None:
+    for declared in INPUTS:
+        module = sys.modules[declared.open.__module__]
+        source = Path(str(module.__file__))
+        files = source.parent.rglob("*.py") if source.name == "__init__.py" else [source]
+        text = "".join(path.read_text(encoding="utf-8") for path in files)
+        assert set(re.findall(r'drop\(\s*"(\w+)"', text)) | {"malformed"} <= {*declared.drop_reasons}
+        assert all(f'"{reason}"' in text for reason in declared.drop_reasons)
 
 
 def test_timings_keep_all_and_the_newest() -> None:

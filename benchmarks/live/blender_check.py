@@ -13,14 +13,14 @@ import tempfile
 import time
 from pathlib import Path
 
-import bpy
+import bpy  # pyright: ignore[reportMissingImports]
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "clients" / "blender"))
-import package
+import package  # pyright: ignore[reportMissingImports]
 
 sys.path.insert(0, str(package.write_unpacked(Path(tempfile.mkdtemp())).parent))
-import manipnet_live
-from manipnet_live.session import session
+import manipnet_live  # pyright: ignore[reportMissingImports]
+from manipnet_live.session import session  # pyright: ignore[reportMissingImports]
 
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 KNUCKLES = ((0.04, 0.03), (0.1, 0.03), (0.105, 0.0), (0.1, -0.02), (0.09, -0.04))

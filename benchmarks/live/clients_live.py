@@ -1,11 +1,11 @@
-"""Every engine-free client on a real server that a take is replayed to: losses, age, garbage, stalls, restarts.
+"""Losses, age, garbage, stalls and reconnections of every engine-free client on a real server that plays a take.
 
-`python benchmarks/live/clients_live.py [--seconds 60] [--take TAKE --mesh NAME=FILE …]`; without a take it is the
-demo's. Each client first reads alone for the time given and is then stopped for five seconds; at last all are connected
-while the server is killed and started again, twice. Prints a row of a table per client and fails on a limit.
+Each client first reads alone for the given time and is then stopped for five seconds. At the end all are connected
+while the server is killed and started again, twice. Without a take the demo is played. The result is a table with a row
+per client; the exit status is 1 if a limit is not met.
 
-`age` is what a hand is old when it arrives: arrival minus the instant it shows, both on this machine's clock, minus the
-look-ahead. Nothing is asked of a client while it reads: it notes the arrivals itself.
+`age` is how old a hand is when it arrives: its arrival minus the instant it shows, both by this machine's clock, minus
+the look-ahead. A client records the arrivals by itself and gets no questions while it reads.
 """
 
 import argparse
@@ -14,81 +14,44 @@ import signal
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-import zmq
-
-ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "support")]
-from languages import LiveClient, build  # noqa: E402
-
-from manipnet.demo.player import DEMO_OBJECTS  # noqa: E402
-from manipnet.synthesis.objects.library import LIBRARY_FOLDER  # noqa: E402
-from manipnet.wire import TOPIC_BIN, decode_binary  # noqa: E402
+from benchmarks.support import ROOT, LiveClient, LiveServer, build, serving
+from benchmarks.traffic import Received, receiving
+from manipnet.demo.player import DEMO_FILE, DEMO_OBJECTS
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 
 NAMES = ("csharp", "clang", "javascript", "python")
-DEMO = ROOT / "server" / "manipnet" / "demo" / "demo.mcap"
+PORT_OPTIONS = {"hands": "port", "bodies": "input-port", "web": "web-port"}
+"""The options of the ports that a restarted server keeps."""
 AGE_LIMIT_S, BACK_LIMIT_S = 0.020, 2.0
 STALL_S = 5.0
 WARM_FRAMES = 180
-"""Until every place of the client's ring has held a frame with as many bodies; then its memory is what it stays."""
+"""By then every slot of a client's ring has held a frame with as many bodies, and its memory stays constant."""
 
 
 @contextmanager
-def running(*words: str) -> Iterator[subprocess.Popen]:
-    """A process that is killed in the end."""
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+def playing_take(take: Path, address: str) -> Iterator[None]:
+    """Stream a take to the server at `address` during the block, by `play_take` as a separate process."""
+    command = [sys.executable, "-m", "benchmarks.live.play_take", str(take), address]
+    process = subprocess.Popen(command, cwd=ROOT)
     try:
-        yield process
+        yield
     finally:
         process.kill()
         process.wait()
 
 
-@contextmanager
-def server(options: list[str], ports: dict[str, str]) -> Iterator[tuple[subprocess.Popen, dict[str, str]]]:
-    """A server that is ready, with its addresses by name; on `ports` where it is told."""
-    names = {"port": "hands", "input-port": "bodies", "control-port": "control", "osc-port": "osc", "page-port": "page"}
-    words = [f"--{option}={ports.get(name, '0')}" for option, name in (names | {"web-port": "web"}).items()]
-    with running(sys.executable, "-m", "manipnet.cli", *words, *options) as process:
-        assert process.stdout is not None
-        told = process.stdout.readline().split()
-        if not told:
-            raise SystemExit("the server ended without being ready")
-        threading.Thread(target=process.stdout.read, daemon=True).start()  # it goes on telling
-        yield process, dict(zip(told[1::2], told[2::2], strict=True))
+def ages(arrivals: list[list[float]], received: Received) -> list[float]:
+    """Sorted ages on arrival, seconds.
 
-
-class Observer:
-    """Notes of what every message shows: its instant plus look-ahead, by number."""
-
-    def __init__(self, address: str) -> None:
-        self.due_s: dict[int, float] = {}
-        self._socket = zmq.Context.instance().socket(zmq.SUB)
-        self._socket.subscribe(TOPIC_BIN)
-        self._socket.connect(address)
-        threading.Thread(target=self._run, daemon=True).start()
-
-    @property
-    def newest(self) -> int:
-        """The newest message's number; waits for the first."""
-        while not self.due_s:
-            time.sleep(0.01)
-        return next(reversed(self.due_s))
-
-    def _run(self) -> None:
-        while True:
-            message = decode_binary(self._socket.recv()[len(TOPIC_BIN) :])
-            self.due_s[message.seq] = message.t_capture + message.look_ahead
-
-
-def ages(arrivals: list[list[float]], due_s: dict[int, float]) -> list[float]:
-    """Ages on arrival, sorted. A client notes a thousand times a second what is newest; what two frames brought at once
-    counts as having come with the later."""
+    A client checks a thousand times a second which frame is newest; if it finds two new frames at once, both count as
+    having arrived with the later one.
+    """
+    due_s = {message.seq: message.t_capture + message.look_ahead for message in received.messages}
     found, before = [], int(arrivals[0][0]) - 1
     for seq, arrived_s in arrivals:
         found += [arrived_s - due_s[k] for k in range(before + 1, int(seq) + 1) if k in due_s]
@@ -96,15 +59,15 @@ def ages(arrivals: list[list[float]], due_s: dict[int, float]) -> list[float]:
     return sorted(found)
 
 
-def read(client: LiveClient, observer: Observer, seconds: float) -> dict:
-    """Let the client alone; then its losses, ages and garbage."""
+def read(client: LiveClient, received: Received, seconds: float) -> dict:
+    """Leave the client alone for a while; returns its losses, ages and garbage."""
     client.ask_until(lambda f: f["received"] - f["late"] > WARM_FRAMES, 60.0)
     client.ask("arrivals")
     first, memory = client.ask(), footprint(client.process.pid)["VmRSS"]
     time.sleep(seconds)
     last = client.ask()
     memory = footprint(client.process.pid)["VmRSS"] - memory
-    known = ages(client.ask("arrivals"), observer.due_s)
+    known = ages(client.ask("arrivals"), received)
     garbage = last.get("collections", last.get("allocations"))
     return {
         "frames": last["received"] - first["received"],
@@ -116,12 +79,12 @@ def read(client: LiveClient, observer: Observer, seconds: float) -> dict:
     }
 
 
-def stall(client: LiveClient, observer: Observer) -> dict:
-    """Stop the client: what it shows when it goes on must be new."""
+def stall(client: LiveClient, received: Received) -> dict:
+    """Stop the client; after it continues, it must show the newest frames and no backlog."""
     held = client.ask()["shown_seq"]
     os.kill(client.process.pid, signal.SIGSTOP)
     time.sleep(STALL_S)
-    newest, seen = observer.newest, []
+    newest, seen = received.messages[-1].seq, []
     os.kill(client.process.pid, signal.SIGCONT)
     resumed = time.monotonic()
     while not seen or seen[-1] < newest - 5:
@@ -137,12 +100,12 @@ def footprint(pid: int) -> dict[str, int]:
     return {**found, "files": len(os.listdir(f"/proc/{pid}/fd"))}
 
 
-def comeback(clients: dict[str, LiveClient], ready_s: float, known: dict[str, dict]) -> dict[str, dict]:
-    """How soon after the server was ready each client is connected, and has its first frame."""
+def reconnection(clients: dict[str, LiveClient], ready_s: float, known: dict[str, dict]) -> dict[str, dict]:
+    """How soon after the server is ready each client is connected and has its first frame."""
     back: dict[str, dict] = {name: {} for name in clients}
     while any(len(figures) < 2 for figures in back.values()):
         if time.monotonic() > ready_s + 60.0:
-            raise SystemExit(f"not back within a minute: {back}")
+            raise SystemExit(f"some clients did not reconnect within a minute: {back}")
         for name, client in clients.items():
             figures = client.ask()
             if figures["connections"] > known[name]["connections"]:
@@ -152,45 +115,16 @@ def comeback(clients: dict[str, LiveClient], ready_s: float, known: dict[str, di
     return back
 
 
-def check(rows: dict[str, dict], closed: dict[str, tuple[str, int]]) -> bool:
-    """Print the table; whether every limit is met."""
-    headings = list(next(iter(rows.values())))
-    print(f"\n| client | {' | '.join(headings)} |\n|---|{'---|' * len(headings)}")
-    good = True
-    for name, row in rows.items():
-        kept = {
-            "nothing lost": row["lost"] == 0,
-            "fresh": row["age p99 ms"] < 1e3 * AGE_LIMIT_S,
-            "no garbage": row["garbage"] in (0, "-"),
-            "no backlog": row["backlog shown"] == 0,
-            "back in time": row["back s"] < BACK_LIMIT_S,
-            "no leak": row["threads more"] <= 0 and row["files more"] <= 0,
-            "clean end": closed[name] == ("closed", 0),
-        }
-        broken = [what for what, met in kept.items() if not met]
-        good &= not broken
-        print(f"| {name} | {' | '.join(map(str, row.values()))} | {'NOT MET: ' + ', '.join(broken) if broken else ''}")
-    return good
-
-
-def connected(stack: ExitStack, name: str, command: list[str], addresses: dict[str, str]) -> LiveClient:
-    """A client that receives."""
-    client = LiveClient.start(command, addresses["web" if name == "javascript" else "hands"])
-    stack.callback(client.kill)
-    client.ask_until(lambda f: f["received"] > 0, 60.0)
-    return client
-
-
-def restarts(clients: dict[str, LiveClient], process: subprocess.Popen, start: Callable) -> dict[str, dict]:
-    """Kill the server and `start` it again, twice: how soon clients are back, and what the second time leaked."""
+def restarts(clients: dict[str, LiveClient], server: LiveServer, start: Callable[[], LiveServer]) -> dict[str, dict]:
+    """Kill the server and `start` it again, twice; returns how soon clients are back and what they leaked the second
+    time."""
     rows: dict[str, dict] = {}
     for _ in range(2):
         known = {name: client.ask() for name, client in clients.items()}
         before = {name: footprint(client.process.pid) for name, client in clients.items()}
-        process.kill()
-        process.wait()
-        process = start()
-        rows = comeback(clients, time.monotonic(), known)
+        server.stop(signal.SIGKILL)
+        server = start()
+        rows = reconnection(clients, time.monotonic(), known)
         for name, client in clients.items():
             after = footprint(client.process.pid)
             rows[name]["threads more"] = after["Threads"] - before[name]["Threads"]
@@ -198,35 +132,63 @@ def restarts(clients: dict[str, LiveClient], process: subprocess.Popen, start: C
     return rows
 
 
+def check(rows: dict[str, dict], closed: dict[str, tuple[str, int]]) -> bool:
+    """Print the table; returns whether every limit is met."""
+    headings = list(next(iter(rows.values())))
+    print(f"\n| client | {' | '.join(headings)} |\n|---|{'---|' * len(headings)}")
+    good = True
+    for name, row in rows.items():
+        limits = {
+            "frames lost": row["lost"] == 0,
+            "age": row["age p99 ms"] < 1e3 * AGE_LIMIT_S,
+            "garbage": row["garbage"] in (0, "-"),
+            "backlog shown": row["backlog shown"] == 0,
+            "time to reconnect": row["back s"] < BACK_LIMIT_S,
+            "leak": row["threads more"] <= 0 and row["files more"] <= 0,
+            "end": closed[name] == ("closed", 0),
+        }
+        broken = [what for what, is_met in limits.items() if not is_met]
+        good &= not broken
+        print(f"| {name} | {' | '.join(map(str, row.values()))} | {'NOT MET: ' + ', '.join(broken) if broken else ''}")
+    return good
+
+
+def connected(stack: ExitStack, name: str, command: list[str], addresses: dict[str, str]) -> LiveClient:
+    """Start a client and wait until it receives."""
+    client = LiveClient.start(command, addresses["web" if name == "javascript" else "hands"])
+    stack.callback(client.kill)
+    client.ask_until(lambda f: f["received"] > 0, 60.0)
+    return client
+
+
 def run(take: Path, meshes: list[str], seconds: float) -> bool:
-    """All of it; whether every limit is met."""
-    options = [word for mesh in meshes for word in ("--mesh", mesh)]
+    """Measure everything; returns whether every limit is met."""
+    options = [f"--mesh={mesh}" for mesh in meshes]
     rows: dict[str, dict] = {}
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         commands = {name: build(name, folder) for name in NAMES}
-        process, addresses = stack.enter_context(server(options, {}))
-        player = Path(__file__).with_name("play_take.py")
-        stack.enter_context(running(sys.executable, str(player), str(take), addresses["bodies"]))
-        observer = Observer(addresses["hands"])
-        for name, command in commands.items():
-            client = connected(stack, name, command, addresses)
-            rows[name] = read(client, observer, seconds) | stall(client, observer)
-            print(f"{name}: {rows[name]}, load {os.getloadavg()[0]:.1f}", flush=True)
-            client.close()
+        server = stack.enter_context(serving(*options))
+        addresses = server.addresses
+        stack.enter_context(playing_take(take, addresses["bodies"]))
+        with receiving(addresses["hands"]) as received:
+            for name, command in commands.items():
+                client = connected(stack, name, command, addresses)
+                rows[name] = read(client, received, seconds) | stall(client, received)
+                print(f"{name}: {rows[name]}, load {os.getloadavg()[0]:.1f}", flush=True)
+                client.close()
         clients = {name: connected(stack, name, command, addresses) for name, command in commands.items()}
-        ports = {name: address.rpartition(":")[2] for name, address in addresses.items()}
-        back = restarts(clients, process, lambda: stack.enter_context(server(options, ports))[0])
-        return check(
-            {name: rows[name] | back[name] for name in rows}, {name: client.close() for name, client in clients.items()}
-        )
+        ports = [f"--{option}={addresses[name].rpartition(':')[2]}" for name, option in PORT_OPTIONS.items()]
+        back = restarts(clients, server, lambda: stack.enter_context(serving(*options, *ports)))
+        closed = {name: client.close() for name, client in clients.items()}
+        return check({name: rows[name] | back[name] for name in rows}, closed)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--take", type=Path, default=DEMO)
-    parser.add_argument("--mesh", action="append", default=[], metavar="NAME=FILE")
+    parser.add_argument("--seconds", type=float, default=60.0, help="to read with each client (default: %(default)g)")
+    parser.add_argument("--take", type=Path, default=DEMO_FILE, help="the take to play (default: the demo)")
+    parser.add_argument("--mesh", action="append", default=[], metavar="NAME=FILE", help="an object's mesh; repeatable")
     options = parser.parse_args()
     meshes = options.mesh or [f"{name}={LIBRARY_FOLDER / name}.ply" for name in DEMO_OBJECTS]
     return 0 if run(options.take, meshes, options.seconds) else 1

@@ -1,9 +1,10 @@
-"""What an open page costs the hands: the demo's server without and with a browser at its page, in turns, in one run.
+"""What an open page costs the hands: the server of the demo without and with a browser at its page, alternately.
 
-`python benchmarks/live/page_cost.py [SECONDS]` needs Chromium and Linux. The browser draws in software here, elsewhere
-a graphics card does it: it gets what the server, at its usual priority, leaves (`chrt --idle`).
+It needs Chromium and Linux. The browser draws in software here, which a graphics card does elsewhere; therefore it only
+gets the processor time that the server, at its usual priority, leaves (`chrt --idle`).
 """
 
+import argparse
 import os
 import shutil
 import sys
@@ -14,11 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "support"))
-
-from browser import browsing
-from live_server import LiveServer, Subscriber, serving
-
+from benchmarks.support import LiveServer, Subscriber, browsing, serving
 from manipnet.wire import HandsMessage
 
 TURNS = 3
@@ -27,10 +24,12 @@ SETTLE_S = 5.0
 
 def main() -> None:
     """Measure and print."""
-    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 20.0
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("seconds", nargs="?", type=float, default=20.0, help="of each turn (default: %(default)g)")
+    seconds = parser.parse_args().seconds
     chromium = shutil.which("chromium")
     if chromium is None:
-        sys.exit("needs Chromium: apt-get install chromium")
+        sys.exit("this measurement needs Chromium: apt-get install chromium")
     without: list[HandsMessage] = []
     beside: list[HandsMessage] = []
     with serving("--demo") as server, tempfile.TemporaryDirectory() as folder:
@@ -54,7 +53,7 @@ def main() -> None:
 
 
 def listen(server: LiveServer, seconds: float) -> list[HandsMessage]:
-    """What is published for so long, once things have settled; another seq between two turns is a gap of no meaning."""
+    """The messages published during `seconds`, after a pause in which the load settles."""
     time.sleep(SETTLE_S)
     subscriber = Subscriber(server.addresses["hands"])
     messages = [subscriber.next()]
@@ -65,7 +64,7 @@ def listen(server: LiveServer, seconds: float) -> list[HandsMessage]:
 
 
 def figures(messages: list[HandsMessage]) -> np.ndarray:
-    """Median and 99th percentile of a tick's work and of the time between two messages, milliseconds `(4,)`."""
+    """Median and 99th percentile of a tick's work and of the time between two messages, in milliseconds `(4,)`."""
     work_ms = [m.latency_ms.sense + m.latency_ms.infer + m.latency_ms.ik for m in messages]
     pairs = pairwise(messages)
     apart_ms = [1e3 * (b.t_publish - a.t_publish) for a, b in pairs if b.seq == a.seq + 1]

@@ -1,10 +1,10 @@
-"""Stream a take to a server in real time, for ever, stamped with this machine's monotonic clock.
+"""Stream a take to a server in a loop, with times of this machine's monotonic clock.
 
-`python benchmarks/live/play_take.py TAKE tcp://HOST:PORT`. `manipnet replay` sends a take's own times; with these,
-whoever receives a hand on the same machine knows how old it is.
+With these times, a client on the same machine knows how old a hand is when it arrives; `manipnet replay` sends the
+times of the take.
 """
 
-import sys
+import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,13 +17,20 @@ from manipnet_tools.takes.take import read_take
 
 
 def stamped(frames: list[BodyFrame]) -> Iterator[BodyFrame]:
-    """The frames over and over, each at the time it is due; the first is due at once."""
+    """Repeat the frames without end, each with the time at which it is due; the first is due at once."""
     start_s = time.monotonic()
     for frame in looped(frames):
         yield replace(frame, t_s=start_s + frame.t_s - frames[0].t_s)
 
 
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("take", type=Path)
+    parser.add_argument("address", help="of the server's bodies, tcp://HOST:PORT")
+    arguments = parser.parse_args()
+    frames = list(take_frames(read_take(arguments.take)))
+    play(stamped(frames), connect(arguments.address))
+
+
 if __name__ == "__main__":
-    path, address = sys.argv[1:]
-    take = list(take_frames(read_take(Path(path))))
-    play(stamped(take), connect(address))
+    main()

@@ -1,7 +1,7 @@
-"""The offset between two clocks of which the truth is known, as the server and its clients measure it.
+"""How well the server and its clients measure the offset between two clocks, where the true offset is known.
 
-All processes of this machine share one monotonic clock, so a client's offset to the server must come out as zero; and
-the fake Motive's clock is a known time ahead. Eight pings, of which the one with the smallest round trip counts.
+All processes of this machine share one monotonic clock, so a client's true offset to the server is zero; the clock of
+the fake Motive is ahead by a known time. A measurement sends eight pings and uses the one with the shortest round trip.
 """
 
 import time
@@ -9,21 +9,20 @@ import time
 import msgpack
 import numpy as np
 import zmq
-from fake_motive import FakeMotive
-from live_server import LiveServer, serving
 
+from benchmarks.support import FakeMotive, LiveServer, serving
 from manipnet.net.clock_offset import ClockOffset, measure_offset
 
 from .row import Row, parser, report
 
 ERROR_S = 0.2e-3
 PAUSE_S = 0.2
-"""Requests are held back beyond a rate no client has; a client measures every few seconds."""
+"""The server delays requests above a rate that no client has; a client measures every few seconds."""
 NAMES = {1: "left_wrist", 2: "right_wrist", 3: "Box"}
 
 
 def control_offsets(server: LiveServer, measurements: int) -> list[ClockOffset]:
-    """A client's offset to the server by `ping`, measured so many times."""
+    """A client's offset to the server by the request `ping`, measured `measurements` times."""
     with zmq.Context() as context, context.socket(zmq.REQ) as req:
         req.setsockopt(zmq.LINGER, 0)
         req.connect(server.addresses["control"])
@@ -41,7 +40,7 @@ def control_offsets(server: LiveServer, measurements: int) -> list[ClockOffset]:
 
 
 def row(what: str, errors_s: np.ndarray, bounds_s: np.ndarray) -> Row:
-    """Errors beside what was published as uncertainty."""
+    """The row for errors `(n,)` and the uncertainties `(n,)` that were published with them."""
     inside = float(np.mean(np.abs(errors_s) <= bounds_s))
     return Row(
         f"{what}, {len(errors_s)} times",
@@ -56,7 +55,9 @@ def row(what: str, errors_s: np.ndarray, bounds_s: np.ndarray) -> Row:
 
 def main() -> None:
     options = parser(__doc__, 20.0)
-    options.add_argument("--measurements", type=int, default=100, help="of a client (default: %(default)s)")
+    options.add_argument(
+        "--measurements", type=int, default=100, help="number of measurements by the client (default: %(default)s)"
+    )
     arguments = options.parse_args()
     with FakeMotive((4, 1), NAMES) as motive, serving("--natnet", f"127.0.0.1:{motive.port}") as server:
         found = control_offsets(server, arguments.measurements)

@@ -1,8 +1,8 @@
-"""What half an hour cannot tell of memory in MB an hour: does anything stay behind of a tick, a client, a request?
+"""Whether a tick, a client or a request leaves memory behind, more precisely than half an hour of `soak` can show.
 
-The server's own tick loop for two actors, without sockets, as fast as it goes: how many blocks Python's allocator
-holds. Then a real server that is visited again and again: its memory after each hundred of metrics read, subscribers,
-requests.
+First the server's tick loop runs for two actors, without sockets and as fast as possible, and the blocks that Python's
+allocator holds are counted. Then a real server receives hundreds of metrics readers, subscribers and requests, and its
+memory is measured after each hundred.
 """
 
 import gc
@@ -11,28 +11,27 @@ import time
 import urllib.request
 from collections.abc import Callable
 
-import msgpack
 import numpy as np
 import zmq
-from live_server import LiveServer, serving
 
+from benchmarks.support import LiveServer, serving
+from benchmarks.traffic import playing, zmq_sender
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.wire import TOPIC_BIN
 from manipnet_tools.bench.harness import Rig
 from manipnet_tools.bench.scenarios import demo
 
-from .live import playing, zmq_sender
-from .motion import frames, motion
+from .motion import frames, mesh_options, motion
 from .process import usage
 from .row import Row, parser, report
 
 TICKS, ROUNDS, VISITS = 1_500, 8, 100
 ASK_S = 0.006
-"""Requests are held back beyond a rate no client has."""
+"""The server delays requests above a rate that no client has."""
 
 
 def blocks() -> list[int]:
-    """Blocks held after each round of ticks."""
+    """The number of allocated blocks after each round of ticks."""
     rig, held = Rig(load_bundle(), demo(), actors=2), []
     for _ in range(ROUNDS):
         for _ in range(TICKS):
@@ -56,20 +55,15 @@ def subscribe(server: LiveServer) -> None:
 
 
 def ask(server: LiveServer) -> None:
-    with zmq.Context() as context, context.socket(zmq.REQ) as socket:
-        socket.setsockopt(zmq.LINGER, 0)
-        socket.connect(server.addresses["control"])
-        socket.send(msgpack.packb({"op": "status"}) or b"")
-        socket.poll(1_000)
+    server.ask({"op": "status"})
     time.sleep(ASK_S)
 
 
 def visited(visit: Callable[[LiveServer], None]) -> list[float]:
-    """MB of its own before, and after each hundred visits to a server that performs."""
-    performance = motion(120.0)
-    meshes = [f"--mesh={name}={path}" for name, path in performance.meshes.items()]
-    with serving(*meshes, "--metrics-port", "0") as server:
-        with playing(frames(performance, np.inf), zmq_sender(server.addresses["bodies"])):
+    """Private memory in MB of a server with a live session, before and after each hundred visits."""
+    scenario = motion(120.0)
+    with serving(*mesh_options(scenario), "--metrics-port", "0") as server:
+        with playing(frames(scenario, np.inf), zmq_sender(server.addresses["bodies"])):
             time.sleep(5.0)
             held = [usage(server.process.pid).own_mb]
             for _ in range(4):
@@ -80,11 +74,11 @@ def visited(visit: Callable[[LiveServer], None]) -> list[float]:
 
 
 def main() -> None:
-    arguments = parser(__doc__, 0.0).parse_args()
+    arguments = parser(__doc__, None).parse_args()
     held = blocks()
     per_tick = (held[-1] - held[1]) / (TICKS * (ROUNDS - 2))
-    text = f"{held[1]} → {held[-1]} blocks over {TICKS * (ROUNDS - 2)} ticks: {per_tick:.4f} a tick"
-    rows = [Row("tick loop, two actors", "none stays", text, abs(per_tick) < 0.01, {"blocks": held})]
+    text = f"{held[1]} → {held[-1]} blocks over {TICKS * (ROUNDS - 2)} ticks: {per_tick:.4f} per tick"
+    rows = [Row("tick loop, two actors", "no growth", text, abs(per_tick) < 0.01, {"blocks": held})]
     for what, visit in (("metrics read", read_metrics), ("subscribers", subscribe), ("status requests", ask)):
         own_mb = visited(visit)
         text = " → ".join(f"{value:.2f}" for value in own_mb) + " MB"

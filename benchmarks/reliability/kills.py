@@ -1,7 +1,7 @@
-"""Server, sender and client killed (SIGKILL) at random for ten minutes, and started again at once.
+"""How soon server, sender and client are back after they are killed (SIGKILL) at random and restarted at once.
 
-The ports stay the same. A killed one counts as back when the client shows live hands again. Times are counted from
-where the restarted process can act: a server from its `ready` line, sender and client from when they are loaded.
+The ports stay the same. A killed process is back when the client shows live hands again. Times count from the moment at
+which the restarted process can act: for a server its line `ready`, for sender and client the end of their loading.
 """
 
 import queue
@@ -16,22 +16,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from live_server import LiveServer
 
-from .motion import motion, recording
+from benchmarks.support import LiveServer
+
+from .motion import mesh_options, motion, recording
 from .roles import start
 from .row import Row, parser, report
 
 RATE_HZ, BACK_S = 120.0, 1.0
 CALM_S = (1.0, 5.0)
 PATIENCE_S = 60.0
-PORTS = {"hands": "port", "bodies": "input-port", "control": "control-port", "osc": "osc-port", "web": "web-port"}
+PORT_OPTIONS = {
+    "hands": "port",
+    "bodies": "input-port",
+    "control": "control-port",
+    "osc": "osc-port",
+    "web": "web-port",
+}
+"""The option of each address in the server's line `ready`."""
 VICTIMS = ("server", "sender", "client")
 
 
 @dataclass(frozen=True)
 class Kill:
-    """Seconds from the kill to the new process ready; and from there to connected, and to live hands."""
+    """Seconds from the kill until the new process is ready, and from then until connected and until live hands."""
 
     victim: str
     restart_s: float
@@ -40,7 +48,7 @@ class Kill:
 
 
 class Role:
-    """A process of `roles` and what it says."""
+    """A process of `roles` and the lines that it prints."""
 
     def __init__(self, role: str, address: str, *more: str) -> None:
         self._arguments = role, address, *more
@@ -52,13 +60,13 @@ class Role:
         self.process, self.lines = self._start()
 
     def wait_for(self, word: str, after_s: float = 0.0) -> float:
-        """When it said `word`, after `after_s`."""
+        """The time at which it printed `word`, at or after `after_s`."""
         give_up_s = time.monotonic() + PATIENCE_S
         while time.monotonic() < give_up_s:
-            at_s, said, *_ = self.lines.get(timeout=PATIENCE_S)
-            if said == word and float(at_s) >= after_s:
+            at_s, printed, *_ = self.lines.get(timeout=PATIENCE_S)
+            if printed == word and float(at_s) >= after_s:
                 return float(at_s)
-        raise TimeoutError(f"{self._arguments[0]}: no {word!r}")
+        raise TimeoutError(f"{self._arguments[0]} did not print {word!r} within {PATIENCE_S:g} s")
 
     def _start(self) -> tuple[subprocess.Popen[str], "queue.Queue[list[str]]"]:
         process, lines = start(*self._arguments), queue.Queue()
@@ -67,8 +75,8 @@ class Role:
 
 
 @dataclass
-class Chaos:
-    """A server on ports of its own choice that keep, with its sender and client."""
+class Trio:
+    """A server that keeps its ports, a sender and a client."""
 
     options: list[str]
     recording: Path
@@ -78,14 +86,7 @@ class Chaos:
     def __post_init__(self) -> None:
         server = LiveServer(*self.options).wait_ready()
         ports = {what: address.rpartition(":")[2] for what, address in server.addresses.items()}
-        names = {
-            "hands": "port",
-            "bodies": "input-port",
-            "control": "control-port",
-            "osc": "osc-port",
-            "web": "web-port",
-        }
-        self.options += [f"--{option}={ports[what]}" for what, option in names.items() if what in ports]
+        self.options += [f"--{option}={ports[what]}" for what, option in PORT_OPTIONS.items() if what in ports]
         self.server = server
         self.sender = Role("perform", server.addresses["bodies"], str(self.recording))
         self.client = Role("look", server.addresses["hands"])
@@ -98,7 +99,7 @@ class Chaos:
         self.server.stop()
 
     def kill(self, victim: str) -> Kill:
-        """Kill it, start it anew, wait for live hands."""
+        """Kill a process, start it again and wait for live hands."""
         killed_s = time.monotonic()
         if victim == "server":
             ready_s = self._restart_server()
@@ -118,7 +119,7 @@ class Chaos:
             try:
                 self.server.wait_ready()
                 break
-            except AssertionError as error:  # it ended: an address is taken, or worse
+            except AssertionError as error:  # it ended, for example because an address is still in use
                 self.stuck.append(str(error))
                 self.server.stop()
         ready_s = time.monotonic()
@@ -138,19 +139,18 @@ def _forward(stream, lines: "queue.Queue[list[str]]") -> None:
 def main() -> None:
     arguments = parser(__doc__, 600.0).parse_args()
     rng = random.Random(arguments.seed)
-    performance = motion(RATE_HZ)
+    scenario = motion(RATE_HZ)
     kills: list[Kill] = []
     with tempfile.TemporaryDirectory() as folder:
-        meshes = [f"--mesh={name}={path}" for name, path in performance.meshes.items()]
-        chaos = Chaos(meshes, recording(performance, Path(folder)))
+        trio = Trio(mesh_options(scenario), recording(scenario, Path(folder)))
         try:
             end_s = time.monotonic() + arguments.seconds
             while time.monotonic() < end_s:
                 time.sleep(rng.uniform(*CALM_S))
-                kills.append(chaos.kill(rng.choice(VICTIMS)))
+                kills.append(trio.kill(rng.choice(VICTIMS)))
                 print(kills[-1], file=sys.stderr, flush=True)
         finally:
-            chaos.close()
+            trio.close()
     killed = {victim: [kill for kill in kills if kill.victim == victim] for victim in VICTIMS}
     rows = [_row(victim, of_victim) for victim, of_victim in killed.items() if of_victim]
     starts = len(killed["server"]) + 1
@@ -158,9 +158,9 @@ def main() -> None:
         Row(
             f"{len(kills)} kills in {arguments.seconds / 60:g} min",
             "no stuck port, session id changes",
-            f"{len(chaos.stuck)} stuck ports; {len(set(chaos.sessions))} session ids of {starts} servers",
-            not chaos.stuck and len(set(chaos.sessions)) == starts,
-            {"stuck": chaos.stuck, "sessions": chaos.sessions},
+            f"{len(trio.stuck)} stuck ports; {len(set(trio.sessions))} session ids of {starts} servers",
+            not trio.stuck and len(set(trio.sessions)) == starts,
+            {"stuck": trio.stuck, "sessions": trio.sessions},
         )
     )
     report("kills", rows, arguments.out)

@@ -1,4 +1,4 @@
-"""What processes hold: memory, descriptors, threads, from /proc (Linux)."""
+"""Memory, descriptors and threads of processes, read from /proc (Linux)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Usage:
-    """One process and its children together: MB of memory of its own and resident, open descriptors, threads."""
+    """A process and its children together: private and resident memory in MB, open descriptors, threads."""
 
     own_mb: float
     resident_mb: float
@@ -16,7 +16,7 @@ class Usage:
 
 
 def usage(pid: int) -> Usage:
-    """Raises `OSError` when the process has ended."""
+    """Read the usage of a process; raises `OSError` when it has ended."""
     family = [pid, *_descendants(pid)]
     parts = [_one(member) for member in family]
     return Usage(*(sum(column) for column in zip(*parts, strict=True)), processes=len(family))

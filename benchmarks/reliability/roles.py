@@ -1,48 +1,47 @@
-"""People around a server as processes of their own, which can be stopped and killed: `python -m … ROLE ADDRESS …`.
+"""Run a sender or clients of a server as a separate process, which other measurements stop and kill.
 
-`perform` sends bodies, its time from zero, and goes on whatever becomes of the server. `look` is the Python client; it
-prints a line for each connection, each session, and whenever live hands come or stop coming. `crowd` is N subscribers
-that read everything, `slow` one that reads once a second. Every line begins with the monotonic time; `loaded` is the
-first, `connected` follows.
+The role `perform` sends the bodies of a recording and reconnects whenever the server goes away. `look` is the Python
+client; it prints a line for each connection, for each session, and whenever live hands begin or end. `crowd` is a
+number of subscribers that read everything, and `slow` is one that reads once a second. Every line begins with the
+monotonic time; the first is `loaded`, and `connected` follows.
 """
 
+import argparse
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import zmq
 
+from benchmarks.support import ROOT, Client
+from benchmarks.traffic import zmq_sender
 from manipnet.inputs.playback import PlayError, looped, play
 from manipnet.recording.mcap_file import read_bodies
 from manipnet.wire import TOPIC_MSGPACK
 
-from .live import zmq_sender
-
-ROOT = Path(__file__).parents[2]
-AGAIN_S, FRESH_S = 0.05, 0.1
+RETRY_S, FRESH_S = 0.05, 0.1
 
 
 def start(role: str, address: str, *more: str) -> subprocess.Popen[str]:
-    """A process of that role; its lines come on `stdout`."""
+    """Start a process with that role; it prints its lines to `stdout`."""
     command = [sys.executable, "-m", "benchmarks.reliability.roles", role, address, *more]
     return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT)
 
 
 def say(*words: object) -> None:
-    """One line, with the time."""
+    """Print one line that begins with the time."""
     print(f"{time.monotonic():.6f}", *words, flush=True)
 
 
 def perform(address: str, path: str) -> None:
-    """The frames of a recording, for ever."""
+    """Send the frames of a recording in a loop."""
     recorded = list(read_bodies(path))
     say("loaded")
     while True:
         try:
             sender = zmq_sender(address)
         except PlayError:
-            time.sleep(AGAIN_S)
+            time.sleep(RETRY_S)
             continue
         say("connected")
         try:
@@ -52,10 +51,7 @@ def perform(address: str, path: str) -> None:
 
 
 def look(address: str) -> None:
-    """The Python client, for ever."""
-    sys.path.insert(0, str(ROOT / "clients" / "python"))
-    from manipnet_client import Client
-
+    """Receive with the Python client and print what changes."""
     say("loaded")
     with Client(address) as client:
         newest, session, connections, live = None, None, 0, False
@@ -77,7 +73,7 @@ def look(address: str) -> None:
 
 
 def crowd(address: str, count: str) -> None:
-    """Many subscribers, on one thread."""
+    """Read everything with `count` subscribers on one thread."""
     context, poller = zmq.Context(), zmq.Poller()
     for _ in range(int(count)):
         socket = _subscriber(context, address)
@@ -89,7 +85,7 @@ def crowd(address: str, count: str) -> None:
 
 
 def slow(address: str) -> None:
-    """A subscriber that reads once a second."""
+    """Read one message a second."""
     socket = _subscriber(zmq.Context(), address)
     say("connected")
     while True:
@@ -105,5 +101,16 @@ def _subscriber(context: zmq.Context, address: str) -> zmq.Socket:
     return socket
 
 
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("role", choices=ROLES)
+    parser.add_argument("address", help="tcp://HOST:PORT")
+    parser.add_argument("more", nargs="*", help="the recording to perform, or the number of subscribers in the crowd")
+    arguments = parser.parse_args()
+    ROLES[arguments.role](arguments.address, *arguments.more)
+
+
+ROLES = {"perform": perform, "look": look, "crowd": crowd, "slow": slow}
+
 if __name__ == "__main__":
-    {"perform": perform, "look": look, "crowd": crowd, "slow": slow}[sys.argv[1]](*sys.argv[2:])
+    main()

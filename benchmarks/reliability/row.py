@@ -1,4 +1,4 @@
-"""A figure of `docs/reliability.md`: what was measured, how, against what, on which machine."""
+"""Rows of `docs/reliability.md`: what was measured, the target, the result, and the machine."""
 
 import argparse
 import json
@@ -13,7 +13,7 @@ from manipnet_tools.bench.machine import this_machine
 
 @dataclass(frozen=True)
 class Row:
-    """One measurement. `met` is None where the target says nothing about it."""
+    """One measurement. `met` is None if there is no target."""
 
     test: str
     target: str
@@ -22,12 +22,15 @@ class Row:
     details: Mapping[str, Any]
 
 
-def parser(text: str | None, seconds: float) -> argparse.ArgumentParser:
-    """The options that every measurement has."""
+def parser(text: str | None, seconds: float | None) -> argparse.ArgumentParser:
+    """A parser with the options of all measurements; without `seconds` the duration cannot be chosen."""
     result = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
-    result.add_argument("--seconds", type=float, default=seconds, help="how long to measure (default: %(default)g)")
-    result.add_argument("--seed", type=int, default=1)
-    result.add_argument("--out", type=Path, default=Path("build/reliability"), metavar="FOLDER", help="for the JSON")
+    if seconds is not None:
+        result.add_argument("--seconds", type=float, default=seconds, help="how long to measure (default: %(default)g)")
+    result.add_argument("--seed", type=int, default=1, help="of the random numbers (default: %(default)d)")
+    result.add_argument(
+        "--out", type=Path, default=Path("build/reliability"), metavar="FOLDER", help="where to write the JSON"
+    )
     return result
 
 

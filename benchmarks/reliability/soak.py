@@ -1,9 +1,9 @@
-"""Two actors at 240 Hz for half an hour: does memory, do descriptors, do threads grow?
+"""Whether memory, descriptors or threads grow during half an hour with two actors at 240 Hz.
 
-Around it goes on what goes on around a server: a client that comes and goes every minute, `status` every ten seconds,
-metrics read every minute. Memory is what belongs to the server's processes alone (USS), sampled every five seconds; the
-line is fitted after a warm-up, and its uncertainty comes from blocks of a minute, since neighbouring
-samples are alike.
+Meanwhile a client connects every minute for a second, `status` is requested every ten seconds and the metrics are read
+every minute. The memory is the private memory of the server's processes (USS), sampled every five seconds. A line is
+fitted to it after a warm-up. The uncertainty of the line comes from averages over a minute, because neighbouring
+samples are correlated.
 """
 
 import sys
@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 import zmq
-from live_server import LiveServer, serving
 
+from benchmarks.support import LiveServer, serving
+from benchmarks.traffic import playing, zmq_sender
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK
 
-from .live import playing, zmq_sender
 from .motion import frames, motion, rig_file
 from .process import Usage, usage
 from .row import Row, parser, report
@@ -31,10 +31,10 @@ SLOPE_MB_H = 1.0
 
 
 def soak(seconds: float) -> tuple[list[tuple[float, Usage]], dict, list[int]]:
-    """Samples with their times, the server's last `status`, and how many messages each subscriber had."""
-    performance = motion(RATE_HZ)
+    """Samples with their times, the server's last `status`, and the number of messages of each subscriber."""
+    scenario = motion(RATE_HZ)
     with tempfile.TemporaryDirectory() as folder:
-        rig = rig_file(performance, ACTORS, Path(folder))
+        rig = rig_file(scenario, ACTORS, Path(folder))
         with serving("--rig", str(rig), "--metrics-port", "0") as server:
             received = [0, 0]
             stopping = threading.Event()
@@ -44,7 +44,7 @@ def soak(seconds: float) -> tuple[list[tuple[float, Usage]], dict, list[int]]:
             ]
             for thread in threads:
                 thread.start()
-            with playing(frames(performance, np.inf, ACTORS), zmq_sender(server.addresses["bodies"])):
+            with playing(frames(scenario, np.inf, ACTORS), zmq_sender(server.addresses["bodies"])):
                 samples = _sample(server, seconds)
                 status = _status(server)
             stopping.set()
@@ -67,14 +67,14 @@ def _sample(server: LiveServer, seconds: float) -> list[tuple[float, Usage]]:
 
 
 def _status(server: LiveServer) -> dict:
-    """The server's status, which on a very busy machine may take more than one question."""
+    """The server's status; on a very busy machine it takes more than one request."""
     while "counters" not in (status := server.ask({"op": "status"})):
         print(status, file=sys.stderr)
     return status
 
 
 def _visit(server: LiveServer) -> None:
-    """A client comes, reads for a second, and goes; the metrics are read."""
+    """Connect a client for a second, and read the metrics."""
     stopping, seen = threading.Event(), [0]
     thread = threading.Thread(target=_count, args=(server.addresses["hands"], TOPIC_BIN, seen, 0, stopping))
     thread.start()
@@ -96,8 +96,10 @@ def _count(address: str, topic: bytes, counts: list[int], index: int, stopping: 
 
 
 def slope_mb_h(samples: Sequence[tuple[float, Usage]]) -> tuple[float, float]:
-    """MB per hour of memory of its own, and twice its standard error by the means of blocks; NaN where there are too
-    few."""
+    """Growth of private memory in MB per hour, and twice its standard error from the means of blocks.
+
+    Both are NaN if there are fewer than four blocks.
+    """
     blocks: dict[int, list[tuple[float, float]]] = {}
     for at_s, used in samples:
         blocks.setdefault(int(at_s // BLOCK_S), []).append((at_s / 3600.0, used.own_mb))
@@ -110,7 +112,9 @@ def slope_mb_h(samples: Sequence[tuple[float, Usage]]) -> tuple[float, float]:
 
 def main() -> None:
     options = parser(__doc__, 1800.0)
-    options.add_argument("--warm-up", type=float, default=300.0, help="seconds before the fit (default: %(default)g)")
+    options.add_argument(
+        "--warm-up", type=float, default=300.0, help="seconds that are not fitted (default: %(default)g)"
+    )
     arguments = options.parse_args()
     samples, status, received = soak(arguments.seconds)
     settled = [(at_s, used) for at_s, used in samples if at_s >= arguments.warm_up]
@@ -120,7 +124,7 @@ def main() -> None:
         what: sorted({getattr(used, what) for _, used in settled}) for what in ("descriptors", "threads", "processes")
     }
     measured = (
-        f"{slope:+.2f} ± {error:.2f} MB/h (own {first.own_mb:.1f} → {last.own_mb:.1f} MB), "
+        f"{slope:+.2f} ± {error:.2f} MB/h (private {first.own_mb:.1f} → {last.own_mb:.1f} MB), "
         f"descriptors {flat['descriptors']}, threads {flat['threads']}; skipped ticks "
         f"{status['counters'].get('ticks_skipped', {})}, dropped {status['counters'].get('frames_dropped', {})}"
     )

@@ -1,28 +1,29 @@
-"""Clients with the wrong keys at each ZeroMQ socket of a server with keys, while a listed pair performs.
+"""Clients without valid keys at each ZeroMQ socket of a server with keys, beside a listed sender and subscriber.
 
-Six kinds: a listed key but another server's public key; no key; ZeroMQ's user name and password instead (PLAIN); a good
-key that is on no list; and TCP clients that speak no ZeroMQ, one that is silent and one that speaks HTTP. Each watches
-hands, sends bodies and asks; nothing may reach it or be taken of it, each refusal must be counted, and the listed pair
-must miss no message.
+There are six kinds: a listed key with another server's public key; no key; ZeroMQ's user name and password (PLAIN); a
+valid key that is not on the list; and two TCP clients that do not speak ZeroMQ, one silent and one speaking HTTP. Each
+subscribes to hands, sends bodies and sends requests. The server must send it nothing, accept nothing from it and count
+each refusal, and the listed subscriber must receive every message.
 """
 
 import socket
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import msgpack
 import zmq
-from live_server import LiveServer, serving
 
+from benchmarks.support import LiveServer, serving
 from manipnet.net.curve_keys import ClientKeys, make_client_keys, make_server_keys, read_client_keys
 from manipnet.net.zap import secure_client
-from manipnet.wire import TOPIC_MSGPACK, decode_msgpack
+from manipnet.wire import TOPIC_MSGPACK, HandsMessage, decode_msgpack
 from manipnet.wire.bodies import BodyFrame, bodies_map
 
-from .motion import frames, motion
+from .motion import frames, mesh_options, motion
 from .row import Row, parser, report
 
 RATE_HZ = 120.0
@@ -31,7 +32,7 @@ STRANGERS = ("wrong server key", "no key", "PLAIN", "key not on the list", *TCP)
 
 
 def stranger_keys(kind: str, folder: Path, listed: ClientKeys) -> ClientKeys | None:
-    """The keys of a stranger, from another server's `folder`; none for one without."""
+    """The keys of a stranger, made in another server's `folder`; None for a stranger without keys."""
     if kind not in ("wrong server key", "key not on the list"):
         return None
     other = make_server_keys(folder)
@@ -41,7 +42,7 @@ def stranger_keys(kind: str, folder: Path, listed: ClientKeys) -> ClientKeys | N
 
 
 class Stranger:
-    """One stranger at three sockets; what it received."""
+    """A ZeroMQ client at three sockets, which counts what it receives."""
 
     def __init__(self, server: LiveServer, keys: ClientKeys | None, plain: bool) -> None:
         self.received = 0
@@ -58,7 +59,7 @@ class Stranger:
         self._control.send(msgpack.packb({"op": "status"}) or b"")
 
     def act(self, frame: BodyFrame) -> None:
-        """Send a frame, see whether anything came."""
+        """Send a frame and count what has arrived."""
         self._bodies.send(msgpack.packb(bodies_map(frame)) or b"")
         for sock in (self._hands, self._control):
             self.received += bool(sock.poll(0) and sock.recv())
@@ -68,7 +69,7 @@ class Stranger:
 
 
 class TcpStranger:
-    """Opens TCP connections and says something; counts bytes beyond ZeroMQ's own greeting of 64."""
+    """Opens TCP connections, sends `words` and counts the bytes that arrive after ZeroMQ's greeting of 64 bytes."""
 
     def __init__(self, server: LiveServer, words: bytes) -> None:
         self.received, self._words = 0, words
@@ -81,7 +82,7 @@ class TcpStranger:
             sock.setblocking(False)
 
     def act(self, frame: BodyFrame) -> None:
-        """Send some, read some."""
+        """Send and read once at each connection."""
         for i, sock in enumerate(self._sockets):
             try:
                 sock.send(self._words)
@@ -96,37 +97,46 @@ class TcpStranger:
 
 
 def visit(kind: str, seconds: float) -> Row:
-    """A stranger beside a listed pair."""
-    performance = motion(RATE_HZ)
+    """Measure one kind of stranger beside a listed sender and subscriber."""
+    scenario = motion(RATE_HZ)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         make_server_keys(folder)
         listed = read_client_keys(make_client_keys(folder, "listed"))
         keys = stranger_keys(kind, folder / "other", listed)
-        meshes = [f"--mesh={prop}={path}" for prop, path in performance.meshes.items()]
-        with serving(*meshes, "--keys", str(folder)) as server, zmq.Context() as context:
+        with serving(*mesh_options(scenario), "--keys", str(folder)) as server, zmq.Context() as context:
             before = server.ask({"op": "status"}, keys=listed)["counters"]
-            messages, frames_sent, received = _perform(server, context, listed, kind, keys, performance, seconds)
+            messages, frames_sent, received = _play(server, context, listed, kind, keys, frames(scenario, seconds))
             counters = server.ask({"op": "status"}, keys=listed)["counters"]
     refused = {
         reason: count - before.get("connections_refused", {}).get(reason, 0)
         for reason, count in counters.get("connections_refused", {}).items()
     }
-    taken = counters["frames_in"]["zmq"] - frames_sent
+    accepted = counters["frames_in"]["zmq"] - frames_sent
     missing = messages[-1].seq - messages[0].seq + 1 - len(messages)
-    print(kind, refused, received, taken, missing, file=sys.stderr, flush=True)
+    print(kind, refused, received, accepted, missing, file=sys.stderr, flush=True)
     return Row(
         f"{kind}, {seconds:g} s at hands, bodies and control",
-        "zero frames, counted, server unharmed",
-        f"{received} messages to it, {taken} frames taken of it, refused {refused or 'none counted'}; the listed "
-        f"client had {len(messages)} messages, {missing} missing",
-        received == 0 and taken == 0 and missing == 0 and sum(refused.values()) >= 3,
-        {"refused": refused, "received": received, "taken": taken, "messages": len(messages), "missing": missing},
+        "nothing sent or accepted, refusals counted, listed clients unaffected",
+        f"{received} messages sent to it, {accepted} frames accepted from it, refusals {refused or 'not counted'}; the "
+        f"listed client received {len(messages)} messages, {missing} missing",
+        received == 0 and accepted == 0 and missing == 0 and sum(refused.values()) >= 3,
+        {"refused": refused, "received": received, "accepted": accepted, "messages": len(messages), "missing": missing},
     )
 
 
-def _perform(server, context, listed, kind, keys, performance, seconds):
-    """The listed pair performs, the stranger tries: hands messages of the listed, frames sent, the stranger's catch."""
+def _play(
+    server: LiveServer,
+    context: zmq.Context,
+    listed: ClientKeys,
+    kind: str,
+    keys: ClientKeys | None,
+    motion: Iterator[BodyFrame],
+) -> tuple[list[HandsMessage], int, int]:
+    """Play the motion with the listed keys while the stranger tries.
+
+    Returns the listed subscriber's messages, the number of frames sent, and how much the stranger received.
+    """
     hands, bodies = context.socket(zmq.SUB), context.socket(zmq.XPUB)
     for sock, where in ((hands, "hands"), (bodies, "bodies")):
         sock.setsockopt(zmq.LINGER, 0)
@@ -135,10 +145,10 @@ def _perform(server, context, listed, kind, keys, performance, seconds):
         sock.connect(server.addresses[where])
     hands.subscribe(TOPIC_MSGPACK)
     if not bodies.poll(10_000):
-        raise TimeoutError("the listed sender was not let in")
+        raise TimeoutError("the server did not admit the listed sender")
     stranger = TcpStranger(server, TCP[kind]) if kind in TCP else Stranger(server, keys, kind == "PLAIN")
     messages, sent, begin_s = [], 0, time.monotonic()
-    for frame in frames(performance, seconds):
+    for frame in motion:
         time.sleep(max(begin_s + frame.t_s - time.monotonic(), 0.0))
         bodies.send(msgpack.packb(bodies_map(frame)) or b"")
         sent += 1

@@ -11,14 +11,15 @@ if TYPE_CHECKING:
     from manipnet.server import Server
     from manipnet.synthesis.model.bundle import load_bundle
     from manipnet.synthesis.objects.shape import load_shape
-    from manipnet.synthesis.synthesizer import Synthesizer
+    from manipnet.synthesis.synthesizer import HandScene, Synthesizer
 
-__all__ = ["Server", "ServerConfig", "Synthesizer", "__version__", "load_bundle", "load_shape"]
+__all__ = ["HandScene", "Server", "ServerConfig", "Synthesizer", "__version__", "load_bundle", "load_shape"]
 
 __version__ = "0.1.0"
 """The one place of the version; the distribution reads it here, and a test compares the clients' with it."""
 
 _MODULES = {
+    "HandScene": "manipnet.synthesis.synthesizer",
     "Server": "manipnet.server",
     "ServerConfig": "manipnet.config.settings",
     "Synthesizer": "manipnet.synthesis.synthesizer",

@@ -1,7 +1,7 @@
 """What one session counts and measures: one `Telemetry` object, which is handed down to whoever reports something.
 
-Every counter has one label. The counters and the values of their labels are declared here; the sets are closed, so a
-sender cannot make them grow.
+Every counter has one label. The counters are declared here, with the values that their labels may take; the protocols
+add theirs with `Telemetry.declare` when they open. The sets are closed from then on, so a sender cannot make them grow.
 """
 
 import logging
@@ -14,23 +14,16 @@ from typing import Final
 import numpy as np
 from hdrh.histogram import HdrHistogram
 
-SOURCES = ("zmq", "osc", "natnet")
 DROP_REASONS = (
-    "malformed",  # not a message of the protocol, or one that breaks its rules
-    "oversized",  # larger than any message may be
-    "not_allowed",  # a sender that is on no allow-list
-    "rate",  # a source that sends garbage faster than it is worth reading
-    "kernel",  # lost in the socket's buffer before it was read
-    "unsupported",  # a version or message kind that is not understood
-    "incomplete",  # a part of the frame did not arrive
     "duplicate",  # the same instant twice
-    "internal",  # a fault of our own while a frame was taken in
+    "internal",  # a fault of the server while it took the frame in
     "late",  # older than what was already accepted
-    "unknown_body",  # nothing in it that the rig knows
-    "other_sender",  # a second sender of the same bodies while the first one is heard
-    "time_jump",  # far from the stream's time, and no others with it
+    "unknown_body",  # the rig knows none of its bodies
+    "other_sender",  # a second sender of the same bodies while the first one still sends
+    "time_jump",  # far from the stream's time, and no other frames near it
     "mailbox_full",  # the tick loop could not keep up
 )
+"""Why frames of any protocol are dropped once they have arrived; `Input.drop_reasons` are the protocols' own."""
 BODY_REASONS = (
     "nan",
     "bounds",
@@ -47,22 +40,22 @@ CONTROL_OPS = (
 )
 
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "frames_in": ("source", SOURCES),
+    "frames_in": ("source", ()),
     "frames_dropped": ("reason", DROP_REASONS),
     "bodies_rejected": ("reason", BODY_REASONS),
-    "sender_restarts": ("source", SOURCES),
+    "sender_restarts": ("source", ()),
     "connections_refused": ("reason", ("handshake", "not_listed", "too_many", "endless")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
-    "messages_out": ("topic", ("msgpack", "bin", "vmc", "livelink", "web")),
+    "messages_out": ("topic", ()),
     "control_requests": ("op", CONTROL_OPS),
     "recorded": ("fate", ("written", "lost")),
     "page_frames": ("fate", ("shown", "skipped")),
     "page_ended": ("reason", ("crash",)),
 }
-"""Every counter with its one label and the values that the label may take."""
+"""Every counter with its one label and the values of it that are known without the protocols."""
 
 
 STAGES: Final = ("sense", "infer", "ik", "encode", "total", "interval")
@@ -82,6 +75,7 @@ class Telemetry:
         self.timings = Timings()
         self.stages = StageClock(self.timings)
         self._lock = threading.Lock()
+        self._labels = dict(LABELS)
         self._counts: Counter[tuple[str, str]] = Counter()
         self._gauges: list[GaugeSource] = []
 
@@ -90,12 +84,23 @@ class Telemetry:
 
         Raises `KeyError` for a counter or a label value that is not declared.
         """
-        key, allowed = LABELS[name]
+        key, allowed = self._labels[name]
         value = label[key]
         if value not in allowed:
             raise KeyError(f"{name}: {key} {value!r} is not declared; allowed are {', '.join(allowed)}")
         with self._lock:
             self._counts[name, value] += n
+
+    def declare(self, name: str, *values: str) -> None:
+        """Let the label of the counter `name` take these values too."""
+        with self._lock:
+            label, known = self._labels[name]
+            self._labels[name] = label, tuple(dict.fromkeys((*known, *values)))
+
+    def labels(self) -> dict[str, tuple[str, tuple[str, ...]]]:
+        """Every counter with its one label and the values that the label may take."""
+        with self._lock:
+            return dict(self._labels)
 
     def counts(self) -> dict[str, dict[str, int]]:
         """`{name: {label value: count}}` of everything that was counted at least once."""

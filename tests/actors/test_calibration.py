@@ -20,6 +20,7 @@ from manipnet.actors.calibration import (
     upright_on_sheet,
     wrist_on_sheet,
 )
+from manipnet.actors.plan import synthesise
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, BodyConfig
 from manipnet.geometry import Array, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
@@ -219,11 +220,11 @@ def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array
         poses |= {name: compose(poses[name], T) for name, T in clusters.items()}
         bodies = tuple(BodySample(None, name, tuple(T[:3]), tuple(T[3:]), True) for name, T in poses.items())
         actor.push(BodyFrame(i / 120, None, bodies, i / 120, "zmq:test"))
-        while (tick := actor.timeline.poll(i / 120)) is not None:
+        while (tick := actor.poll(i / 120)) is not None:
             plan = actor.plan(tick)
-            steps = synthesizer.step(list(plan.scenes.values()), list(plan.memories.values()))
-            hands = actor.show(plan, dict(zip(plan.scenes, steps, strict=True)))
-            shown.append([hands[side].shown.angles for side in SIDES])
+            synthesise([plan], synthesizer)
+            hands = actor.show(plan)
+            shown.append([hands[side].angles for side in SIDES])
     return np.array(shown)
 
 
@@ -272,7 +273,7 @@ def test_a_new_offset_takes_the_past_along(bundle, cube: Shape) -> None:
             actor.push(BodyFrame(i / 120, None, (sample,), i / 120, "zmq:test"))
         actors[name] = actor
     actors["late"].place("right_wrist", offset)
-    late, always = (actors[name].timeline.poll(1.0).bodies["right_wrist"].window for name in ("late", "always"))
+    late, always = (actors[name].poll(1.0).bodies["right_wrist"].window for name in ("late", "always"))
     assert np.allclose(late, always, atol=1e-12)
     assert np.array_equal(actors["late"].config.wrists["right_wrist"].offset, offset)
     raw = [actor.body_poses("right_wrist", 2.0) for actor in actors.values()]

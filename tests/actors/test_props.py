@@ -9,7 +9,7 @@ from manipnet.actors.props import HYSTERESIS_M, PALM_M, Prop, choose_prop
 from manipnet.geometry import Array, invert, quat_normalize, transform
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import build_shape
-from manipnet.tracking.timeline import BodyAtTick
+from manipnet.tracking.tick import BodyAtTick
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from manipnet.actors.output_guard import MAX_SPEED_RAD_S, MAX_WRIST_RAD_S, NotFiniteError, OutputGuard
-from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, Shown, State, state_at_age
+from manipnet.actors.transitions import HOLD_AFTER_S, REST_AFTER_S, PoseTransition, ShownHand, state_at_age
 from manipnet.geometry import quat_exp, quat_log, quat_multiply
 from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_S
+from manipnet.tracking.tick import TICK_S
+from manipnet.wire import State
 
 REST = DOF_LIMITS_RAD.mean(axis=1)
 FIST = DOF_LIMITS_RAD[:, 1].copy()
@@ -25,9 +26,9 @@ def presence() -> PoseTransition:
 
 
 def run(
-    hand: PoseTransition, ticks: int, state: State, angles, wrist, run: int = 0, held: object = "mug"
-) -> list[Shown]:
-    shown = [hand.show(state, angles, wrist, run, held, TICK_S) for _ in range(ticks)]
+    hand: PoseTransition, ticks: int, state: State, angles, wrist, run: int = 0, prop: str = "mug"
+) -> list[ShownHand]:
+    shown = [hand.show(state, angles, wrist, run, prop, TICK_S) for _ in range(ticks)]
     return [each for each in shown if each is not None]
 
 
@@ -99,7 +100,7 @@ def test_no_sequence_of_events_makes_it_jump_leave_its_limits_or_lose_its_finite
         state = data.draw(st.sampled_from(["live", "hold", "rest"]))
         angles = low + (high - low) * data.draw(st.floats(0.0, 1.0)) if state == "live" else None
         wrist = data.draw(st.sampled_from([HERE, THERE, None]))
-        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i, i):
+        for shown in run(hand, data.draw(st.integers(1, 20)), state, angles, wrist, i, str(i)):
             assert np.isfinite(shown.angles).all()
             assert np.isfinite(shown.wrist).all()
             assert np.all((low <= shown.angles) & (shown.angles <= high))

@@ -1,4 +1,4 @@
-"""The harnesses of the clients in other languages."""
+"""Builds the harnesses of the clients in other languages."""
 
 import functools
 import json
@@ -11,7 +11,7 @@ from languages import build
 
 @pytest.fixture(scope="session")
 def harness(tmp_path_factory):
-    """Returns the command of a language's client by name. Each client is built once in a test run, by one worker."""
+    """Returns the command of a client's harness by name. One worker builds each harness, once in a test run."""
 
     def built(name: str) -> list[str]:
         folder = run_folder(tmp_path_factory) / f"harness-{name}"

@@ -1,4 +1,7 @@
-"""Runs the Python client for the tests: `decode FILES`, `interpolate`, `live ADDRESS`, `idle ADDRESS`. Text lines."""
+"""Run the Python client for the tests, which talk to it in lines of text.
+
+The commands are `decode FILES`, `interpolate`, `live ADDRESS` and `idle ADDRESS`, as in the other languages' harnesses.
+"""
 
 import json
 import queue
@@ -16,7 +19,7 @@ HAND_ARRAYS = ("angles", "rotations", "wrist", "joints")
 
 
 def describe(payload: bytes) -> dict:
-    """A message as the other harnesses tell it."""
+    """A message as the other harnesses print it, or the error of decoding it."""
     try:
         hands = decode(payload)
     except MessageError as error:
@@ -36,7 +39,7 @@ def describe(payload: bytes) -> dict:
 
 
 def interpolate() -> None:
-    """Obeys `delay S`, `push ARRIVAL HEX` and `show NOW`."""
+    """Execute the lines `delay S`, `push ARRIVAL HEX` and `show NOW` of standard input."""
     interpolator = Interpolator()
     for line in sys.stdin:
         verb, number, *data = line.split()
@@ -49,6 +52,7 @@ def interpolate() -> None:
 
 
 def row(shown: Shown | None) -> str:
+    """The numbers of a shown frame that the tests compare, or "none"."""
     if shown is None or shown.hands.left is None:
         return "none"
     left, bodies = shown.hands.left, shown.hands.bodies
@@ -56,8 +60,8 @@ def row(shown: Shown | None) -> str:
     return " ".join(repr(float(x)) for x in (shown.weight, shown.hands.seq, *values))
 
 
-class Show:
-    """What a program does that shows hands, and notes of it."""
+class Display:
+    """Shows hands as a program would, and records what it received and showed."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -67,7 +71,7 @@ class Show:
         self._arrivals: list[tuple[int, float]] = []
 
     def step(self) -> None:
-        """Wait for news at most a millisecond; show if it is time to."""
+        """Wait at most a millisecond for a frame, and show one when it is due."""
         fresh = self._client.wait(after=self._newest, timeout_s=0.001)
         if fresh is not None:
             self._newest = fresh
@@ -79,10 +83,12 @@ class Show:
             self._shows += self._shown is not None
 
     def arrivals(self) -> list[tuple[int, float]]:
-        told, self._arrivals = self._arrivals, []
-        return told
+        """The number and time of every frame received since the last call."""
+        arrivals, self._arrivals = self._arrivals, []
+        return arrivals
 
     def figures(self) -> dict:
+        """The statistics of the client and the frame shown last."""
         stats, shown = self._client.stats(), self._shown
         names = ("state", "received", "lost", "late", "refused", "connections", "seq", "rate_hz", "transit_s")
         return {name: getattr(stats, name) for name in names} | {
@@ -95,7 +101,7 @@ class Show:
 
 
 def live(address: str) -> None:
-    """Show at about 90 Hz until standard input ends; for every line figures, or for "arrivals" those since."""
+    """Show at about 90 Hz until standard input ends; answer "arrivals" with arrivals, any other line with figures."""
     questions: queue.SimpleQueue[str | None] = queue.SimpleQueue()
 
     def listen() -> None:
@@ -105,20 +111,20 @@ def live(address: str) -> None:
 
     threading.Thread(target=listen, daemon=True).start()
     with Client(address, delay_s=0.05) as client:
-        show, question = Show(client), ""
+        display, question = Display(client), ""
         while question is not None:
-            show.step()
+            display.step()
             if not questions.empty() and (question := questions.get()) is not None:
-                print(json.dumps(show.arrivals() if question == "arrivals" else show.figures()), flush=True)
+                print(json.dumps(display.arrivals() if question == "arrivals" else display.figures()), flush=True)
     print("closed")
 
 
 def idle(address: str) -> None:
-    """Never shows anything and blocks the main thread: figures for every line read."""
+    """Block the main thread and show nothing; print figures for every line of standard input."""
     with Client(address, delay_s=0.05) as client:
-        show = Show(client)
+        display = Display(client)
         for _ in sys.stdin:
-            print(json.dumps(show.figures()), flush=True)
+            print(json.dumps(display.figures()), flush=True)
     print("closed")
 
 

@@ -15,7 +15,7 @@ from checkout import ROOT, publishing
 from joint_poses import assert_joints
 from manipnet_client import decode
 from manipnet_client.retarget import BONES
-from test_retarget import ENDS, posed
+from random_hand import ENDS, posed
 
 from manipnet import __version__
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate, quat_to_matrix
@@ -51,7 +51,7 @@ def pose_of(position, rotation):
 
 
 def armature(bpy, rng):
-    """Both hands with Mixamo's names, hand and finger bones turned at random, in a T-pose of our own."""
+    """Both hands in a T-pose, with Mixamo's bone names and randomly rotated hand and finger bones."""
     positions, _ = forward_kinematics(np.zeros(20))
     bones = []
     for side, sign in (("Left", -1.0), ("Right", 1.0)):
@@ -84,7 +84,10 @@ def quat_of(matrix):
 
 
 def posed_rotations(thing, side):
-    """Blender's own rule: a bone's pose is its parent's, times its rest in the parent's, times its own rotation."""
+    """The finger bones of a side and their posed rotations `(15, 4)` by Blender's rule.
+
+    A bone's pose is its parent's pose, times its rest pose relative to its parent's, times its own rotation.
+    """
     world = {}
     for bone in thing.data.bones:
         rest = quat_of(bone.matrix_local)
@@ -111,7 +114,7 @@ def test_bones_point_where_the_hand_does(blender, side):
     bind = np.array([bone.tail_local - bone.head_local for bone in bones])
     shown = quat_rotate(quat_multiply(turned, quat_conjugate(rest)), bind)
     shown /= np.linalg.norm(shown, axis=1, keepdims=True)
-    # Up to one common turn, that of the hand itself: compare the angles between all bones.
+    # The rotation of the hand itself is unknown here, so the angles between all pairs of bones are compared.
     np.testing.assert_allclose(shown @ shown.T, along @ along.T, atol=1e-5)
 
 
@@ -130,7 +133,7 @@ def show_until(blender, condition, limit_s=20.0):
         time.sleep(0.005)
 
 
-def test_live_recorded_and_gone(blender):
+def test_a_live_session_is_recorded_and_leaves_nothing_behind(blender):
     threads = threading.active_count()
     thing = armature(blender.bpy, np.random.default_rng(4))
     session = blender.session
@@ -144,7 +147,7 @@ def test_live_recorded_and_gone(blender):
     assert threading.active_count() == threads
     assert not blender.bpy.app.timers.registered
     curves = thing.animation_data.action.curves
-    assert len(curves) == 2 * (16 * 4 + 3)  # fingers and wrists turn, wrists move
+    assert len(curves) == 2 * (16 * 4 + 3)  # rotations of fingers and wrists, locations of wrists
     assert thing.animation_data.action_slot == ("OBJECT", "Rig")
     assert frames > 5
     for curve in curves.values():
@@ -170,7 +173,7 @@ def test_actions_without_slots(blender):
     np.testing.assert_allclose([px, pz], [[0.0, 0.2, 0.4, 0.6], [1.0] * 4], atol=1e-9)
 
 
-def test_empties_stand_where_the_joints_are(blender):
+def test_empties_follow_the_joints(blender):
     session, objects = blender.session, blender.bpy.data.objects
     with publishing() as (_, tcp, _):
         session.start(tcp, "", 0.05, None, False)
@@ -200,7 +203,7 @@ def test_a_wrong_address_is_reported(blender):
     assert not blender.session.is_running
 
 
-def test_the_panel_tells_what_goes_on(blender):
+def test_the_panel_shows_state_rate_and_losses(blender):
     panel, drawn = importlib.import_module("manipnet_live.panel"), []
     layout = SimpleNamespace(
         column=lambda: SimpleNamespace(prop=lambda _, name: drawn.append(name)),

@@ -1,4 +1,4 @@
-"""The Python client with keys: listed, unlisted, with another server's key, and against the real server."""
+"""The Python client with keys: on the list, not on it, with another server's key, and on a real server."""
 
 import time
 from contextlib import contextmanager
@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 import zmq
-from live_server import scene, serving
+from live_server import serving
 from manipnet_client import Client, subscribe
 from publisher import message
 from zmq.auth.thread import ThreadAuthenticator
@@ -19,11 +19,15 @@ from manipnet.wire import TOPIC_BIN, encode_binary
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 DOMAIN = "hands"
+WRISTS = tuple(
+    BodySample(None, f"{side}_wrist", (x_m, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0), True)
+    for side, x_m in (("left", 0.14), ("right", -0.14))
+)
 
 
 @pytest.fixture
 def folder(tmp_path):
-    """Keys of a server and of a client."""
+    """A folder with the keys of a server and of a listed client."""
     make_server_keys(tmp_path)
     make_client_keys(tmp_path, "listed")
     return tmp_path
@@ -31,7 +35,7 @@ def folder(tmp_path):
 
 @contextmanager
 def publisher(folder):
-    """A publisher with the server's keys that lets only the client "listed" in."""
+    """A publisher with the server's keys that admits only the client "listed"."""
     keys, listed = read_server_keys(folder), read_client_keys(folder / "listed.toml").pair.public
     context = zmq.Context()
     gate = ThreadAuthenticator(context)
@@ -53,7 +57,7 @@ def publisher(folder):
 
 
 def wait_for_state(client, words):
-    """The state is set before the client waits for its next try, so it comes round again and again."""
+    """Wait until the client reports `words`; it reports the same state again after every attempt."""
     for _ in range(2_000):
         if words in client.stats().state:
             return
@@ -73,10 +77,10 @@ def test_a_listed_client_reads(folder):
     assert client.stats().state == "closed"
 
 
-def test_a_server_that_went_comes_back(folder):
+def test_a_client_reconnects(folder):
     with publisher(folder) as (pub, address), Client(address, keys=folder / "listed.toml") as client:
         assert pub.recv() == b"\x01" + TOPIC_BIN
-        pub.send(TOPIC_BIN + bytes(200_000))  # more than any message: the client hangs up
+        pub.send(TOPIC_BIN + bytes(200_000))  # larger than any message, so the client closes the connection
         assert pub.recv() == b"\0" + TOPIC_BIN
         assert pub.recv() == b"\x01" + TOPIC_BIN
         pub.send(TOPIC_BIN + encode_binary(message(0, 0.0, 0.0)))
@@ -96,7 +100,7 @@ def test_iteration(folder):
         hands.close()
 
 
-def test_who_is_turned_away_is_told_why(folder, tmp_path_factory):
+def test_a_refused_client_reports_the_reason(folder, tmp_path_factory):
     other = tmp_path_factory.mktemp("other")
     make_server_keys(other)
     make_client_keys(folder, "unlisted")
@@ -121,7 +125,7 @@ def test_a_server_without_curve_and_no_server_at_all(folder):
 
 
 @pytest.mark.parametrize("text", [None, "", 'public = "short"'])
-def test_a_file_of_keys_that_is_none(tmp_path, text):
+def test_a_wrong_file_of_keys(tmp_path, text):
     path = tmp_path / "keys.toml"
     if text is not None:
         path.write_text(text)
@@ -133,12 +137,11 @@ def test_the_real_server_lets_its_client_in(folder, tiny_bundle):
     options = ["--mesh", f"Box={LIBRARY_FOLDER / 'cube.ply'}", "--model", str(tiny_bundle), "--keys", str(folder)]
     with serving(*options) as server, Client(server.addresses["hands"], keys=folder / "listed.toml") as client:
         host, port = server.addresses["osc"].rpartition("/")[2].split(":")
-        sender = OscBodySender(host, int(port))  # OSC has no keys: on this machine anybody may send
+        sender = OscBodySender(host, int(port))  # OSC has no keys; the server accepts it from this machine
         start = time.monotonic()
         while client.newest is None:
             t = time.monotonic() - start
             assert t < 60.0
-            bodies = [BodySample(None, name, tuple(p[:3]), tuple(p[3:]), True) for name, p in scene(t).items()]
-            sender.send(BodyFrame(t, None, tuple(bodies), t, "test"))
+            sender.send(BodyFrame(t, None, WRISTS, t, "test"))
             time.sleep(1 / 120)
         sender.close()

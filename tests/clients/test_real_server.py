@@ -1,4 +1,4 @@
-"""Every client on the real server, which synthesises from bodies it is sent."""
+"""Every client reads a real server that synthesises hands from bodies."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ LIMIT_S = 120.0
 
 
 def perform_until(stage: Stage, done: Callable[[], bool]) -> None:
-    """Send bodies in real time until a client is content."""
+    """Send bodies in real time until `done`."""
     stage.start_s += 1000.0
     begin = time.monotonic()
     while not done():
@@ -40,6 +40,10 @@ def test_python_client_reads_the_server(stage: Stage) -> None:
         perform_until(stage, lambda: client.stats().received > 60)
         hands, shown = client.newest, client.sample()
     assert client.stats().lost == 0
+    assert hands is not None
+    assert shown is not None
+    assert hands.right is not None
+    assert shown.hands.left is not None
     assert hands.right.object == "Box"
     assert [body.name for body in hands.bodies] == ["Box", "left_wrist", "right_wrist"]
     assert shown.hands.left.joints.shape == (26, 7)

@@ -1,46 +1,28 @@
-"""Any rig's finger bones point where ours do, in Python (right-handed) and in C# (Unity's axes)."""
-
-from dataclasses import replace
+"""The finger bones of any rig point where the synthesised ones do, in Python (right-handed) and C# (Unity's axes)."""
 
 import numpy as np
 import pytest
 from languages import run
-from make_vectors import messages
 from manipnet_client import decode
 from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, matches
+from random_hand import posed
 
-from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
+from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, PARENTS
 from manipnet.wire import encode_binary
-
-ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
-
-
-def posed(side, rng):
-    """A message with one random hand, and where its bones point in the wrist frame `(15, 3)`."""
-    angles = rng.uniform(*DOF_LIMITS_RAD.T)
-    positions, matrices = forward_kinematics(angles)
-    world = matrix_to_quat(matrices)
-    local = world.copy()
-    local[1:] = quat_multiply(quat_conjugate(world[PARENTS[1:17]]), world[1:])
-    along = positions[ENDS] - positions[BONES]
-    if side == "left":
-        local, along = mirror_quats(local), along * [-1, 1, 1]
-    live = messages()["live"]
-    hand = replace(live.hands[side], rotations=local)
-    return replace(live, hands={side: hand}), along / np.linalg.norm(along, axis=1, keepdims=True)
 
 
 def foreign_rig(side, rng, mirrored):
-    """A bind pose of other proportions, bent a little, its hand bone and bone axes turned at random.
+    """A slightly bent bind pose with other proportions and random rotations of the hand bone and the bone axes.
 
-    Returns positions, rotations, tips in the rig's hand space, and the turn from our wrist frame to it.
+    Returns positions, rotations and tips in the space of the hand bone, and the rotation from our wrist frame to it.
     """
     positions, _ = forward_kinematics(rng.uniform(-0.2, 0.3, 20))
     positions = 1.3 * positions
-    positions[[5, 8, 14]] = 1.3 * forward_kinematics(np.zeros(20))[0][[5, 8, 14]]  # knuckles: they define the hand
+    positions[[5, 8, 14]] = (
+        1.3 * forward_kinematics(np.zeros(20))[0][[5, 8, 14]]
+    )  # the knuckles define the hand's orientation
     if (side == "left") != mirrored:
         positions = positions * [-1, 1, 1]
     turn = quat_exp(rng.normal(size=3))
@@ -50,7 +32,7 @@ def foreign_rig(side, rng, mirrored):
 
 
 def shown_directions(positions, rotations, tips, posed_rotations):
-    """Where the rig's bones point once posed: their bind direction carried by what turned them."""
+    """Unit directions of the rig's posed bones `(15, 3)`: the bind directions, rotated from bind pose to posed."""
     ends = np.array([tips[i // 3] if i % 3 == 2 else positions[i + 1] for i in range(15)])
     bind = ends - positions
     turned = quat_rotate(quat_multiply(posed_rotations, quat_conjugate(rotations)), bind)
@@ -64,6 +46,7 @@ def test_python_rig_points_where_the_hand_does(side, seed):
     message, along = posed(side, rng)
     positions, rotations, tips, turn = foreign_rig(side, rng, mirrored=False)
     hand = decode(encode_binary(message)).hand(side)
+    assert hand is not None
     rig = HandRig(side, positions, rotations, tips)
     shown = shown_directions(positions, rotations, tips, rig.solve(hand))
     np.testing.assert_allclose(shown, quat_rotate(turn, along), atol=1e-5)

@@ -1,4 +1,4 @@
-"""Servers that are not what they should be: broken messages, another version, encryption, other protocols, silence."""
+"""Clients meet servers that send broken messages or another version, encrypt, speak another protocol or stay silent."""
 
 import http.server
 import socket
@@ -20,7 +20,7 @@ BAD = [TOPIC_BIN + path.read_bytes() for path in sorted(VECTORS.glob("bad_*.bin"
 
 @pytest.fixture(params=ZMTP_CLIENTS)
 def connecting(request, harness):
-    """Starts a client of each kind at an address, and ends it."""
+    """Starts a client of each kind at an address and kills it at the end."""
     started = []
 
     def start(address):
@@ -33,8 +33,8 @@ def connecting(request, harness):
 
 
 @contextmanager
-def publisher(**options: object) -> Iterator[tuple[zmq.Socket, str]]:
-    """A bare PUB socket that tells when somebody subscribes."""
+def publisher(**options: int | bytes) -> Iterator[tuple[zmq.Socket, str]]:
+    """A plain publisher socket that receives subscriptions as messages."""
     with zmq.Context() as context, context.socket(zmq.XPUB) as pub:
         pub.setsockopt(zmq.LINGER, 0)
         for name, value in options.items():
@@ -81,24 +81,24 @@ def test_another_protocol_is_noticed(connecting):
         thread.join()
 
 
-def test_a_frame_too_large_to_be_ours_ends_the_connection(connecting):
+def test_a_frame_that_is_too_large_ends_the_connection(connecting):
     with publisher(RCVTIMEO=20_000) as (pub, address):
         client = connecting(address)
         pub.recv()
         pub.send(TOPIC_BIN + bytes(200_000))
         client.ask_until(lambda f: f["state"].startswith("reconnecting"))
-        pub.recv()  # unsubscribed by its going
+        pub.recv()  # the end of the connection unsubscribes it
         assert pub.recv() == b"\x01" + TOPIC_BIN
         pub.send(TOPIC_BIN + encode_binary(message(0, 0.0, 0.0)))
         client.ask_until(lambda f: f["received"] == 1)
 
 
 def test_silence_is_bridged_by_pings(connecting):
-    """A server with nothing to say keeps its clients, which ask whether it lives; a dead one loses them."""
+    """A silent server that answers pings keeps its clients; one that does not answer loses them."""
     with publisher(RCVTIMEO=20_000) as (pub, address):
         client = connecting(address)
         pub.recv()
-        assert not pub.poll(3_500)  # longer than a client waits for a server that is dead
+        assert not pub.poll(3_500)  # longer than a client waits for a dead server
         pub.send(TOPIC_BIN + encode_binary(message(0, 0.0, 0.0)))
         client.ask_until(lambda f: f["received"] == 1)
     with socket.create_server(("127.0.0.1", 0)) as mute:

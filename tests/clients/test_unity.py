@@ -1,4 +1,4 @@
-"""The Unity package: its layout as Unity wants it, and its components run on stubs of the engine."""
+"""The Unity package has the layout that Unity requires, and its components run on stubs of the engine."""
 
 import json
 import subprocess
@@ -41,7 +41,7 @@ def glue(tmp_path_factory):
     mcs, mono = need("mcs", "mono")
     exe = tmp_path_factory.mktemp("glue") / "glue.exe"
     sources = [*sorted(PACKAGE.rglob("*.cs")), CSHARP / "Glue.cs", *sorted((CSHARP / "stubs").glob("*.cs"))]
-    # Fields that Unity fills in look never assigned: 649. Attributes and events of stubs: 67, 414.
+    # 649: Unity assigns fields by itself. 67 and 414: the stubs' attributes and events are not used.
     options = ["-langversion:7.2", "-warn:4", "-warnaserror", "-nowarn:649,67,414", "-r:System.Core", f"-out:{exe}"]
     subprocess.run([mcs, *options, *map(str, sources)], check=True)
     return [mono, str(exe)]
@@ -60,15 +60,17 @@ def test_components_pose_a_humanoid_joints_and_a_body(glue):
     assert "no bone for Hand, ThumbProximal" in lines["error:"]
     wrist, hand, joint, body = (np.array(lines[k].split(), float) for k in ("wrist", "hand", "joint", "body"))
     np.testing.assert_allclose(hand[:3], to_unity(wrist)[:3], atol=1e-5)
-    np.testing.assert_allclose(joint[:3], to_unity(wrist)[:3], atol=1e-5)  # the publisher's joints lie in the wrist
+    np.testing.assert_allclose(
+        joint[:3], to_unity(wrist)[:3], atol=1e-5
+    )  # all joints of the publisher are at the wrist
     forward = quat_multiply(to_unity(wrist)[3:], np.array([0.0, 1.0, 0.0, 0.0]))
     assert abs(joint[3:] @ forward) == pytest.approx(1.0, abs=1e-5)
     assert body[0] == pytest.approx(-wrist[0], abs=1e-5)
     finger, by_name, xr = (np.array(lines[k].split(), float) for k in ("finger", "byname", "xr"))
-    np.testing.assert_allclose(by_name, finger, atol=1e-5)  # the same skeleton, found by Mixamo's names
+    np.testing.assert_allclose(by_name, finger, atol=1e-5)  # the same skeleton with Mixamo's names
     palm = np.array(lines["palm"].split(), float)
     np.testing.assert_allclose([xr, palm], [joint, joint], atol=1e-5)
-    assert lines["made"] == "26"  # XR Hands' R_Wrist and R_IndexTip were there
+    assert lines["made"] == "26"  # R_Wrist and R_IndexTip of XR Hands exist already
     assert lines["sample"] == "2 52"
     drawn = [text for key, text in lines.items() if key.startswith("drawn")]
     assert any("tcp://HOST:PORT" in text for text in drawn)

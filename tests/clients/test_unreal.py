@@ -1,4 +1,4 @@
-"""The Unreal plugin: descriptors, connection strings, skeleton, and its glue run on stubs of the engine."""
+"""The Unreal plugin: its descriptor, connection strings and skeleton, and its engine code on stubs of the engine."""
 
 import json
 import re
@@ -10,7 +10,7 @@ from checkout import CLIENTS, ROOT, VECTORS, need, publishing
 from languages import CPP, WARNINGS, run
 from make_vectors import messages
 
-from manipnet.outputs.livelink import hand_json
+from manipnet.outputs.livelink.sender import hand_json
 
 PLUGIN = CLIENTS / "unreal" / "ManipNetLiveLink"
 MODULE = PLUGIN / "Source" / "ManipNetLiveLink"
@@ -19,7 +19,7 @@ STUBS = ROOT / "tests" / "clients" / "cpp" / "stubs"
 
 @pytest.fixture(scope="module", params=["g++", "clang++"])
 def compiler(request, tmp_path_factory):
-    """A compiler and a folder of headers named as the engine's, each of them the stubs."""
+    """The command of a compiler that finds the stubs in place of every header of the engine."""
     (path,) = need(request.param)
     folder = tmp_path_factory.mktemp("engine")
     folders = (MODULE / "Private", MODULE / "Public")
@@ -73,8 +73,10 @@ def test_source_and_factory_on_stubs(compiler, tmp_path):
     assert lines["weight"] == "ManipNetWeight 1"
     wrist, body = (np.array(lines[key].split(), float) for key in ("wrist", "body"))
     assert wrist[[0, 2]] == pytest.approx([0, 0], abs=1e-4)
-    assert body[1] == pytest.approx(wrist[1], abs=1e-3)  # the cube moves with the hand, along our x, Unreal's y
-    assert 2 * np.arctan2(wrist[3], wrist[6]) == pytest.approx(wrist[1] / 100, abs=1e-4)  # our z turn, Unreal's x
+    assert body[1] == pytest.approx(wrist[1], abs=1e-3)  # the cube moves with the hand along our x, which is Unreal's y
+    assert 2 * np.arctan2(wrist[3], wrist[6]) == pytest.approx(
+        wrist[1] / 100, abs=1e-4
+    )  # a turn about our z is one about Unreal's x
     assert lines["machine"] == tcp.removeprefix("tcp://")
     assert "Hz" in lines["status"]
     assert lines["valid"] == "110"
@@ -86,7 +88,7 @@ def core(harness):
     return harness("gcc-sanitized")
 
 
-def test_skeleton_is_that_of_the_json_output(core):
+def test_skeleton_equals_that_of_the_json_output(core):
     live = messages()["live"]
     bones = json.loads(hand_json("a", "left", live.hands["left"].joints))["ManipNet_a_left"]
     lines = run(core, "skeleton", text=(VECTORS / "live.bin").read_bytes().hex() + "\n")

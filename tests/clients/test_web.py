@@ -1,4 +1,4 @@
-"""The web client in a real browser: the example page against a live server that goes and comes back."""
+"""The web client in a real browser: the example page on a live server that is killed and started again."""
 
 import shutil
 
@@ -12,7 +12,7 @@ STUB = ROOT / "tests" / "clients" / "web" / "three-stub.js"
 
 @pytest.fixture
 def pages(tmp_path):
-    """The web client's folder with a stub in three.js's place: tests ask nobody on the network."""
+    """Serves the web client's folder with a stub in place of three.js, so that tests need no network."""
     folder = tmp_path / "web"
     shutil.copytree(CLIENTS / "web", folder)
     for path in ("three/build/three.module.js", "three/examples/jsm/controls/OrbitControls.js"):
@@ -22,7 +22,7 @@ def pages(tmp_path):
         yield address
 
 
-def test_example_page_shows_a_server_that_goes_and_comes_back(pages, tmp_path):
+def test_example_page_reconnects_to_a_restarted_server(pages, tmp_path):
     (chromium,) = need("chromium")
     status = "document.getElementById('status').textContent"
     with publishing("--session", "a") as (process, _, websocket):

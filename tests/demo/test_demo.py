@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from live_server import Subscriber, serving
 
-from manipnet.config.settings import ConfigError, parse_object
+from manipnet.common.options import ConfigError
+from manipnet.config.settings import parse_object
 from manipnet.demo.player import DEMO_FILE, DEMO_OBJECTS, Demo, connectable, demo_objects
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.recording.mcap_file import RecordingWriter, read_bodies
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.outlier_gate import OutlierGate
@@ -25,7 +27,7 @@ def test_it_loops_without_a_jump_in_time(tmp_path: Path) -> None:
             body = BodySample(None, "cube", (math.cos(0.1 * math.pi * k), 1.0, 0.0), (0.0, 0.0, 0.0, 1.0), True)
             writer.write_bodies(BodyFrame(k / 240, k, (body,), 0.0, "test"), k * 4_166_667)
     heard: queue.Queue[BodyFrame] = queue.Queue()
-    receiver = ZmqBodies(heard.put, Telemetry(), port=0)
+    receiver = ZmqBodies(ZEROMQ.intake(heard.put, Telemetry()), port=0)
     receiver.start()
     demo = Demo(path)
     demo.start(receiver.address)

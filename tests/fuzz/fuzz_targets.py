@@ -13,8 +13,8 @@ from fuzz_damage import damaged, reshaped
 from fuzz_files import ACTORS, RIG, bundles, place_recording, place_rig, read_recording, recordings, toml
 from osc_writer import bundle, osc
 
+from manipnet.common.options import ConfigError
 from manipnet.config.rig_reader import load_rig
-from manipnet.config.settings import ConfigError
 from manipnet.inputs.natnet.frames import read_body_names, read_frame
 from manipnet.inputs.natnet.protocol import read_echo, read_packet, read_server_info
 from manipnet.inputs.osc.assembler import FrameAssembler

@@ -12,19 +12,26 @@ import pytest
 from fake_motive import CLOCK_HZ, FakeMotive
 from natnet_writer import Body, Frame, packet, server_info
 
+from manipnet.inputs.natnet import NATNET
 from manipnet.inputs.natnet import client as natnet_client
 from manipnet.inputs.natnet.client import NatNetBodies
 from manipnet.inputs.natnet.frames import read_frame
+from manipnet.inputs.natnet.options import COMMAND_PORT, NatNetOptions
 from manipnet.net.errors import ListenError
 
 VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5)]
 Q = (0.0, 0.6, 0.0, 0.8)
 
 
+def client_of(heard, telemetry, host, port=COMMAND_PORT, allow=(), **options):
+    """A client of the server at `host:port`."""
+    return NatNetBodies(NATNET.intake(heard, telemetry), NatNetOptions((host, port), **options), allow)
+
+
 @pytest.fixture(autouse=True)
 def _hurry(monkeypatch):
     """Chores that are done every second in life are done ten times as often here."""
-    for period in ("KNOCK_S", "KEEP_ALIVE_S", "ECHO_S"):
+    for period in ("CONNECT_S", "KEEP_ALIVE_S", "ECHO_S"):
         monkeypatch.setattr(natnet_client, period, 0.1)
 
 
@@ -33,7 +40,8 @@ def connect(heard, telemetry):
     clients = []
 
     def connect(motive, **options):
-        client = NatNetBodies(heard, telemetry, "127.0.0.1", motive.port, **options)
+        allow = options.pop("allow", ())
+        client = client_of(heard, telemetry, "127.0.0.1", motive.port, allow, **options)
         clients.append(client)
         client.start()
         motive.wait_for(0)
@@ -150,7 +158,7 @@ def test_a_server_that_comes_late_is_found(heard, telemetry):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as placeholder:
         placeholder.bind(("127.0.0.1", 0))
         port = placeholder.getsockname()[1]
-        client = NatNetBodies(heard, telemetry, "127.0.0.1", port)
+        client = client_of(heard, telemetry, "127.0.0.1", port)
         client.start()
         assert placeholder.recv(1_000)[:2] == b"\0\0"
         assert client.status()["state"] == "connecting"
@@ -288,7 +296,7 @@ def test_a_frame_tells_when_it_was_captured_on_our_clock(connect, heard):
 def test_frames_before_the_version_is_known_are_not_guessed_at(heard, telemetry):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as motive:
         motive.bind(("127.0.0.1", 0))
-        client = NatNetBodies(heard, telemetry, *motive.getsockname())
+        client = client_of(heard, telemetry, *motive.getsockname())
         client.start()
         _, address = motive.recvfrom(1_000)
         motive.sendto(packet(7, write((3, 0), 1)), address)
@@ -316,8 +324,8 @@ def test_bad_pose_of_one_body_spares_the_others(connect, heard):
 )
 def test_wrong_places_are_named(heard, telemetry, host, options, says):
     with pytest.raises(ListenError, match=says):
-        NatNetBodies(heard, telemetry, host, **options).start()
+        client_of(heard, telemetry, host, **options).start()
 
 
 def test_stop_without_start(heard, telemetry):
-    NatNetBodies(heard, telemetry, "127.0.0.1").stop()
+    client_of(heard, telemetry, "127.0.0.1").stop()

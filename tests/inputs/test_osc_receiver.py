@@ -8,6 +8,7 @@ import threading
 import pytest
 from osc_writer import bundle, osc
 
+from manipnet.inputs.osc import OSC
 from manipnet.inputs.osc.receiver import MAX_SENDERS, OscBodies
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import FAULTS_PER_S
@@ -25,7 +26,7 @@ def frame(n, *keys):
 
 @pytest.fixture
 def receiver(heard, telemetry):
-    receiver = OscBodies(heard, telemetry, port=0)
+    receiver = OscBodies(OSC.intake(heard, telemetry), port=0)
     receiver.start()
     yield receiver
     receiver.stop()
@@ -120,7 +121,7 @@ def test_senders_that_come_and_go_do_not_pile_up(receiver, heard, sockets):
 
 def test_only_listed_addresses_are_heard(heard, telemetry, sockets):
     allow = [ipaddress.ip_network("127.0.0.2/32")]
-    receiver = OscBodies(heard, telemetry, port=0, allow=allow)
+    receiver = OscBodies(OSC.intake(heard, telemetry), port=0, allow=allow)
     receiver.start()
     stranger, friend = sender(sockets, receiver), sender(sockets, receiver)
     stranger.send(frame(1, 1))
@@ -148,7 +149,7 @@ def test_stop_frees_the_port_and_start_takes_it_again(heard, telemetry, sockets)
     threads = threading.active_count()
     port = 0
     for n in range(3):
-        receiver = OscBodies(heard, telemetry, port=port)
+        receiver = OscBodies(OSC.intake(heard, telemetry), port=port)
         receiver.start()
         port = int(receiver.address.rpartition(":")[2])
         sender(sockets, receiver).send(frame(n, 1))
@@ -160,18 +161,18 @@ def test_stop_frees_the_port_and_start_takes_it_again(heard, telemetry, sockets)
 
 def test_port_in_use_is_named(receiver, heard, telemetry):
     port = int(receiver.address.rpartition(":")[2])
-    with pytest.raises(ListenError, match=rf"OSC on 127.0.0.1:{port}: Address already in use; choose a free"):
-        OscBodies(heard, telemetry, port=port).start()
+    with pytest.raises(ListenError, match=rf"udp://127.0.0.1:{port}: Address already in use; choose a port"):
+        OscBodies(OSC.intake(heard, telemetry), port=port).start()
 
 
 @pytest.mark.parametrize("host", ["no-such-host.invalid", "203.0.113.5"])
 def test_wrong_host_is_named(heard, telemetry, host):
     with pytest.raises(ListenError, match=host):
-        OscBodies(heard, telemetry, host=host, port=0).start()
+        OscBodies(OSC.intake(heard, telemetry), host=host, port=0).start()
 
 
 def test_ipv6(heard, telemetry, sockets):
-    receiver = OscBodies(heard, telemetry, host="::1", port=0)
+    receiver = OscBodies(OSC.intake(heard, telemetry), host="::1", port=0)
     receiver.start()
     udp = socket.socket(socket.AF_INET6, socket.SOCK_DGRAM)
     sockets.append(udp)

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from live_server import Stage, scene
 
+from manipnet.inputs.osc import OSC
 from manipnet.inputs.osc.receiver import OscBodies
 from manipnet.inputs.osc.writer import osc_datagrams
 from manipnet.inputs.playback import OscBodySender, PlayError, looped, play
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_S
+from manipnet.tracking.tick import TICK_S
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError
 from manipnet_tools import cli
 from manipnet_tools.commands import replay
@@ -50,8 +52,8 @@ class Receiving:
 
     def __init__(self, kind: str) -> None:
         self.heard: queue.Queue[BodyFrame] = queue.Queue()
-        make = ZmqBodies if kind == "tcp" else OscBodies
-        self.receiver = make(self.heard.put, Telemetry(), port=0)
+        make, declared = (ZmqBodies, ZEROMQ) if kind == "tcp" else (OscBodies, OSC)
+        self.receiver = make(declared.intake(self.heard.put, Telemetry()), port=0)
         self.receiver.start()
         self.url = f"{kind}://{self.receiver.address.partition('://')[2]}"
 
@@ -130,7 +132,7 @@ def test_nobody_listens(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("url", ["127.0.0.1:5556", "udp://127.0.0.1:5556", "tcp://", "osc://host:99999"])
 def test_where_to_is_checked(url: str) -> None:
-    with pytest.raises(ValueError, match=r"tcp://HOST:PORT|HOST\[:PORT\]"):
+    with pytest.raises(ValueError, match=r"tcp://HOST:PORT or osc://HOST:PORT|HOST or HOST:PORT"):
         replay.connect(url)
 
 

@@ -7,7 +7,8 @@ import msgpack
 import pytest
 import zmq
 
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.errors import ListenError
 from manipnet.net.zmq_socket import MAX_WIRE_BYTES
 from manipnet.wire.bodies import MAX_MESSAGE_BYTES
@@ -19,7 +20,7 @@ def message(frame):
 
 @pytest.fixture
 def receiver(heard, telemetry):
-    receiver = ZmqBodies(heard, telemetry, port=0)
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0)
     receiver.start()
     yield receiver
     receiver.stop()
@@ -104,7 +105,7 @@ def test_sink_that_fails_does_not_end_the_stream(telemetry, heard, context, capl
             raise RuntimeError("digest")
         heard(frame)
 
-    receiver = ZmqBodies(fussy, telemetry, port=0)
+    receiver = ZmqBodies(ZEROMQ.intake(fussy, telemetry), port=0)
     receiver.start()
     try:
         with sender(context, receiver.address) as publisher:
@@ -121,7 +122,7 @@ def test_stop_frees_the_port_and_start_takes_it_again(heard, telemetry, context)
     threads = threading.active_count()
     port = 0
     for n in range(3):
-        receiver = ZmqBodies(heard, telemetry, port=port)
+        receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=port)
         receiver.start()
         port = int(receiver.address.rpartition(":")[2])
         with sender(context, receiver.address) as publisher:
@@ -134,23 +135,23 @@ def test_stop_frees_the_port_and_start_takes_it_again(heard, telemetry, context)
 
 def test_port_in_use_is_named(receiver, heard, telemetry):
     port = int(receiver.address.rpartition(":")[2])
-    with pytest.raises(ListenError, match=rf"{port}: Address already in use; choose a free port"):
-        ZmqBodies(heard, telemetry, port=port).start()
+    with pytest.raises(ListenError, match=rf"{port}: Address already in use; choose a port that is free"):
+        ZmqBodies(ZEROMQ.intake(heard, telemetry), port=port).start()
 
 
 @pytest.mark.parametrize("host", ["no-such-host.invalid", "300.1.1.1", "203.0.113.5"])
 def test_wrong_host_is_named(heard, telemetry, host):
     with pytest.raises(ListenError, match=host):
-        ZmqBodies(heard, telemetry, host=host, port=0).start()
+        ZmqBodies(ZEROMQ.intake(heard, telemetry), host=host, port=0).start()
 
 
 def test_stop_without_start(heard, telemetry):
-    ZmqBodies(heard, telemetry).stop()
+    ZmqBodies(ZEROMQ.intake(heard, telemetry)).stop()
 
 
 @pytest.mark.parametrize("host", ["localhost", "::1"])
 def test_other_spellings_of_loopback(heard, telemetry, context, host):
-    receiver = ZmqBodies(heard, telemetry, host=host, port=0)
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), host=host, port=0)
     receiver.start()
     context.setsockopt(zmq.IPV6, 1)
     with sender(context, receiver.address) as publisher:

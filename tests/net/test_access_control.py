@@ -9,7 +9,8 @@ import msgpack
 import pytest
 import zmq
 
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net import access_control as access
 from manipnet.net.access_control import AccessControl
 from manipnet.net.connection_limits import MAX_UNDELIVERED_BYTES, SMALL_TALK_BYTES, Connections
@@ -137,7 +138,7 @@ def test_frames_without_end_cost_a_subscriber_its_connection(door):
 
 @pytest.mark.skipif(not hasattr(socket, "TCP_INFO"), reason="only Linux tells how much came over a connection")
 def test_frames_without_end_cost_a_sender_its_connection_and_others_nothing(heard, telemetry):
-    receiver = ZmqBodies(heard, telemetry, port=0)
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0)
     receiver.start()
     frame = b"\x03" + struct.pack(">Q", MAX_WIRE_BYTES) + bytes(MAX_WIRE_BYTES)
     with zmq.Context() as context, context.socket(zmq.XPUB) as good, speak_zmtp(receiver.address, b"PUB") as bad:

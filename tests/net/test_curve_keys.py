@@ -7,7 +7,8 @@ import msgpack
 import pytest
 import zmq
 
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.curve_keys import (
     ALLOW_FILE,
     SERVER_FILE,
@@ -34,7 +35,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def receiver(folder, heard, telemetry):
-    receiver = ZmqBodies(heard, telemetry, port=0, keys=read_server_keys(folder))
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0, keys=read_server_keys(folder))
     receiver.start()
     yield receiver
     receiver.stop()
@@ -126,7 +127,7 @@ def test_a_list_that_cannot_be_read_lets_nobody_in(folder, connect, heard, telem
 def test_port_in_use_is_named_and_everything_is_closed(folder, receiver, heard, telemetry):
     port = int(receiver.address.rpartition(":")[2])
     with pytest.raises(ListenError, match="in use"):
-        ZmqBodies(heard, telemetry, port=port, keys=read_server_keys(folder)).start()
+        ZmqBodies(ZEROMQ.intake(heard, telemetry), port=port, keys=read_server_keys(folder)).start()
 
 
 # Key files

@@ -7,8 +7,9 @@ import numpy as np
 from make_vectors import messages
 
 from manipnet.geometry import compose
-from manipnet.outputs import livelink as livelink_json
 from manipnet.outputs.axes import to_unreal
+from manipnet.outputs.declaration import EncodedHands
+from manipnet.outputs.livelink import sender as livelink_json
 from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 LIVE = messages()["live"]
@@ -46,7 +47,7 @@ def test_one_datagram_per_hand_arrives():
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(10)
         sender = livelink_json.LiveLinkJsonSender("127.0.0.1", receiver.getsockname()[1])
-        sender.send(LIVE)
+        sender.send(EncodedHands(LIVE, b"", b""))
         subjects = [next(iter(json.loads(receiver.recv(65536)))) for _ in range(2)]
         sender.close()
     assert subjects == ["ManipNet_actor_left", "ManipNet_actor_right"]

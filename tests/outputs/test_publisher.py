@@ -8,9 +8,10 @@ import pytest
 import zmq
 from publisher import message
 
-from manipnet.config.settings import ServerConfig, default_actor
+from manipnet.config.settings import ServerConfig
 from manipnet.control.service import Control
-from manipnet.inputs.zeromq import ZmqBodies
+from manipnet.inputs.zeromq import ZEROMQ
+from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.curve_keys import (
     ClientKeys,
     KeyFileError,
@@ -21,13 +22,21 @@ from manipnet.net.curve_keys import (
 )
 from manipnet.net.curve_keys import read_client_keys as read_keys
 from manipnet.net.zap import secure_client
+from manipnet.outputs import open_outputs
+from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
+from manipnet.outputs.websocket import WebSocketOptions
+from manipnet.outputs.zeromq import ZmqOutputOptions
 from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
 
-CONFIG = ServerConfig((default_actor(),), port=0, web_port=0)
+CONFIG = ServerConfig((), protocols=(ZmqOutputOptions(port=0), WebSocketOptions(web_port=0)))
 MOST_KEPT_BYTES = 6 << 20
-"""For a client that has stopped: `SEND_HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
+"""For a client that has stopped: `HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
+
+
+def publisher_of(telemetry, keys=None):
+    return Publisher(open_outputs(CONFIG.of, Emission(telemetry, keys=keys)), telemetry)
 
 
 @pytest.fixture
@@ -43,7 +52,7 @@ def telemetry():
 
 @pytest.fixture
 def publisher(telemetry):
-    publisher = Publisher(CONFIG, telemetry)
+    publisher = publisher_of(telemetry)
     yield publisher
     publisher.close()
 
@@ -109,9 +118,9 @@ def test_a_list_that_cannot_be_read_is_named_and_leaves_nothing_open(tmp_path):
     keys.allow_file.unlink()
     threads = threading.active_count()
     for start in (
-        lambda: Publisher(CONFIG, Telemetry(), keys),
+        lambda: publisher_of(Telemetry(), keys),
         lambda: Control("127.0.0.1", 0, {}, Telemetry(), keys),
-        ZmqBodies(print, Telemetry(), port=0, keys=keys).start,
+        ZmqBodies(ZEROMQ.intake(print, Telemetry()), port=0, keys=keys).start,
     ):
         with pytest.raises(KeyFileError, match=r"cannot read .*clients\.allow"):
             start()
@@ -131,9 +140,9 @@ def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, t
     server, friend = read_server_keys(tmp_path), read_keys(make_client_keys(tmp_path, "stage-pc"))
     frames, hands, bodies, control = [], Telemetry(), Telemetry(), Telemetry()
     with ExitStack() as opened:
-        publisher = Publisher(CONFIG, hands, server)
+        publisher = publisher_of(hands, server)
         opened.callback(publisher.close)
-        receiver = ZmqBodies(frames.append, bodies, port=0, keys=server)
+        receiver = ZmqBodies(ZEROMQ.intake(frames.append, bodies), port=0, keys=server)
         receiver.start()
         opened.callback(receiver.stop)
         asked = Control("127.0.0.1", 0, {"ping": lambda request: {"t": 0.0}}, control, server)

@@ -11,7 +11,9 @@ from make_vectors import messages
 from pythonosc.osc_bundle import OscBundle
 
 from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
-from manipnet.outputs import vmc
+from manipnet.net.osc import osc_message
+from manipnet.outputs.declaration import EncodedHands
+from manipnet.outputs.vmc import sender as vmc
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.skeleton import PARENTS
 from manipnet.wire import HandPose
@@ -37,10 +39,10 @@ def hand(rotations, wrist_q=IDENTITY):
 
 
 def test_bytes_are_those_of_the_osc_specification():
-    assert vmc.osc_message("/oscillator/4/frequency", 440.0) == bytes.fromhex(
+    assert osc_message("/oscillator/4/frequency", "f", 440.0).dgram == bytes.fromhex(
         "2f6f7363696c6c61746f722f342f6672657175656e6379002c66000043dc0000"
     )
-    assert vmc.osc_message("/foo", 1000, -1, "hello", 1.234, 5.678) == bytes.fromhex(
+    assert osc_message("/foo", "iisff", 1000, -1, "hello", 1.234, 5.678).dgram == bytes.fromhex(
         "2f666f6f000000002c69697366660000000003e8ffffffff68656c6c6f0000003f9df3b640b5b22d"
     )
 
@@ -55,6 +57,15 @@ def test_a_bundle_fits_a_packet_and_says_what_the_specification_asks():
     names = [m.params[0] for m in OscBundle(bundle) if m.address == "/VMC/Ext/Bone/Pos"]
     assert len(set(names)) == 16
     assert {"RightHand", "RightThumbProximal", "RightLittleDistal"} <= set(names)
+
+
+def test_a_bundle_carries_the_poses_of_its_bones_in_their_order():
+    hand = messages()["live"].hands["left"]
+    bundle = OscBundle(vmc.hand_bundle("left", hand, 1.5, PLAIN))
+    sent = {m.params[0]: m.params[1:] for m in bundle if m.address == "/VMC/Ext/Bone/Pos"}
+    poses = vmc.bone_poses("left", hand, PLAIN)
+    assert list(sent) == list(poses)
+    np.testing.assert_allclose(list(sent.values()), list(poses.values()), atol=1e-6)
 
 
 def test_angle_zero_is_the_t_pose_without_correction():
@@ -110,7 +121,7 @@ def test_read_by_an_independent_osc_tool():
     try:
         text, give_up = b"", time.monotonic() + 20
         while text.count(b"/VMC/Ext/Bone/Pos") < 32 and time.monotonic() < give_up:
-            sender.send(message)  # again and again: the tool does not tell when it listens
+            sender.send(EncodedHands(message, b"", b""))  # again and again: the tool does not tell when it listens
             while select.select([process.stdout], [], [], 0.05)[0]:
                 text += process.stdout.read1(65536)
     finally:

@@ -7,7 +7,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from manipnet.outputs.websocket import MAX_CLIENTS, MAX_REQUESTS, WebSocketPublisher
+from manipnet.outputs.websocket.server import MAX_CLIENTS, MAX_REQUESTS, WebSocketPublisher
 from manipnet.telemetry import Telemetry
 
 
@@ -18,9 +18,9 @@ def telemetry():
 
 @pytest.fixture
 def publisher(telemetry):
-    publisher = WebSocketPublisher("127.0.0.1", 0, telemetry)
+    publisher = WebSocketPublisher(telemetry, "127.0.0.1", 0)
     yield publisher
-    publisher.stop()
+    publisher.close()
 
 
 def receive(publisher, connection, payload):
@@ -75,7 +75,7 @@ def test_a_crowd_is_bounded_and_counted(publisher, telemetry):
             receive(publisher, crowd.enter_context(connect(publisher.address, max_queue=None)), b"x")
         with connect(publisher.address) as late, pytest.raises(ConnectionClosed, match="at most 32 clients"):
             late.recv(timeout=10)
-        assert publisher.client_count == MAX_CLIENTS
+        assert publisher.connected() == MAX_CLIENTS
     assert telemetry.counts() == {"connections_refused": {"too_many": 1}}
 
 
@@ -87,7 +87,7 @@ def test_a_chatterbox_is_cut_off(publisher, telemetry):
     with connect(publisher.address) as connection:
         for _ in range(MAX_REQUESTS):
             connection.send(b"x")
-        with pytest.raises(ConnectionClosed, match="nothing is to be said"):
+        with pytest.raises(ConnectionClosed, match="clients must not send anything"):
             connection.recv(timeout=10)
     assert telemetry.counts() == {"connections_refused": {"endless": 1}}
 
@@ -95,13 +95,13 @@ def test_a_chatterbox_is_cut_off(publisher, telemetry):
 def test_a_port_in_use_is_an_error(publisher):
     port = int(publisher.address.rpartition(":")[2])
     with pytest.raises(OSError, match="in use"):
-        WebSocketPublisher("127.0.0.1", port, Telemetry())
+        WebSocketPublisher(Telemetry(), "127.0.0.1", port)
 
 
-def test_stop_twice_and_publish_after():
-    publisher = WebSocketPublisher("127.0.0.1", 0, Telemetry())
-    publisher.stop()
-    publisher.stop()
+def test_close_twice_and_publish_after():
+    publisher = WebSocketPublisher(Telemetry(), "127.0.0.1", 0)
+    publisher.close()
+    publisher.close()
     publisher.publish(b"nobody hears this")
     host, port = publisher.address.removeprefix("ws://").split(":")
     with pytest.raises(OSError):

@@ -43,8 +43,8 @@ class TickObserver:
     def __init__(self) -> None:
         self.frames: list[Frame] = []
 
-    def see(self, actor, tick, _, steps, message) -> None:
-        self.frames.append(frame_of(actor, tick, steps, message))
+    def see(self, actor, plan, message) -> None:
+        self.frames.append(frame_of(actor, plan.tick, plan.steps, message))
 
 
 @pytest.fixture(scope="module")

@@ -52,7 +52,7 @@ def test_what_cannot_be_recorded_is_said(stage: Stage, takes: Path) -> None:
     for name in ("../elsewhere", "", "a/b", 7, "x" * 65):
         assert "letters, digits" in stage.server.ask({"op": "record", "name": name})["error"]
     (takes / "there.mcap").write_bytes(b"")
-    assert "is there already" in stage.server.ask({"op": "record", "name": "there"})["error"]
+    assert "already exists" in stage.server.ask({"op": "record", "name": "there"})["error"]
     stage.server.ask({"op": "record", "name": "one"})
     assert "one.mcap is being recorded" in stage.server.ask({"op": "record", "name": "two"})["error"]
     assert stage.server.ask({"op": "stop_recording"})["name"] == "one.mcap"

@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_server import scene
-from simulated_link import Link, Weather
+from simulated_link import Link, LinkQuality
 from test_tick_loop import Bench, actor, frame
 
 from manipnet.actors.props import Prop
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_HZ, TICK_S
+from manipnet.tracking.tick import TICK_HZ, TICK_S
 from manipnet.wire import HandsMessage
 
 RATE_HZ, SECONDS, SETTLE_S, STEP_S = 120.0, 4.0, 1.0, 0.002
-BAD = Weather(loss=0.05, delay_s=0.08, jitter_s=0.02, reorder=0.25, duplicate=0.02)
-WORSE = Weather(loss=0.1, delay_s=0.3, jitter_s=0.1, reorder=0.25, duplicate=0.05)
+BAD = LinkQuality(loss=0.05, delay_s=0.08, jitter_s=0.02, reorder=0.25, duplicate=0.02)
+WORSE = LinkQuality(loss=0.1, delay_s=0.3, jitter_s=0.1, reorder=0.25, duplicate=0.05)
 
 Arrive = Callable[[float], list[float]]
 """From when a frame was sent to when it arrives: never, once, or twice."""
@@ -42,7 +42,7 @@ def receive(bundle: Bundle, tmp_path: Path):
     def run(arrive: Arrive, look_ahead_s: float) -> list[HandsMessage]:
         telemetry = Telemetry()
         one = actor(bundle, ObjectCatalog(), telemetry, Prop("Box", "cube", shape))
-        one.timeline.look_ahead_s = look_ahead_s
+        one.look_ahead_s = look_ahead_s
         bench = Bench(bundle, tmp_path, [one], telemetry)
         sent = [i / RATE_HZ for i in range(round(SECONDS * RATE_HZ))]
         arrivals = sorted((at_s, t_s) for t_s in sent for at_s in arrive(t_s))
@@ -58,7 +58,7 @@ def receive(bundle: Bundle, tmp_path: Path):
     return run
 
 
-def over(weather: Weather) -> Arrive:
+def over(weather: LinkQuality) -> Arrive:
     link = Link(weather, seed=1)
     return lambda t_s: [t_s + delay_s for delay_s in link.delays_s()]
 
@@ -85,8 +85,10 @@ def assert_every_tick(messages: list[HandsMessage]) -> None:
 
 @pytest.mark.parametrize("look_ahead_s", [0.5, 0.1, 0.0])
 @pytest.mark.parametrize("weather", [BAD, WORSE], ids=str)
-def test_every_tick_comes_out_of_a_bad_network_without_a_jump(receive, weather: Weather, look_ahead_s: float) -> None:
-    clean, messages = receive(over(Weather()), look_ahead_s), receive(over(weather), look_ahead_s)
+def test_every_tick_comes_out_of_a_bad_network_without_a_jump(
+    receive, weather: LinkQuality, look_ahead_s: float
+) -> None:
+    clean, messages = receive(over(LinkQuality()), look_ahead_s), receive(over(weather), look_ahead_s)
     assert_every_tick(messages)
     if look_ahead_s >= weather.jitter_s:
         assert {hand.state for m in messages for hand in m.hands.values()} == {"live"}

@@ -153,7 +153,7 @@ BAD = [
     ({"op": "look_ahead", "seconds": 0.6}, "seconds is 0.6; allowed are 0.0 … 0.5"),
     ({"op": "look_ahead", "seconds": float("nan")}, "seconds is nan; it must be a number"),
     ({"op": "look_ahead", "seconds": True}, "seconds is True; it must be a number"),
-    ({"op": "select_object", "object": "cube"}, "body is missing or no name"),
+    ({"op": "select_object", "object": "cube"}, "body is missing; give the streaming id or the name"),
     ({"op": "select_object", "body": "Box", "object": "cloud"}, "object is 'cloud'; allowed are "),
     ({"op": "select_object", "body": "Box", "object": "cube", "scale": 0}, "scale is 0; allowed are 0.2 … 5.0"),
     ({"op": "select_object", "body": "left_wrist", "object": "cube"}, "body 'left_wrist' is the left_wrist"),

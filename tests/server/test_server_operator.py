@@ -36,7 +36,7 @@ def test_a_mesh_is_brought_in_and_selected(stage: Stage, tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("more", "complaint"),
     [
-        ({}, "file is missing or no text"),
+        ({}, "file is missing or is not a path"),
         ({"file": "nowhere.obj"}, "nowhere.obj: no such file"),
         ({"file": str(LIBRARY_FOLDER / "cube.ply"), "unit": "furlong"}, "unit is 'furlong'; allowed are m, dm"),
         ({"file": str(LIBRARY_FOLDER / "cube.ply"), "unit": "mm"}, "cube.ply: "),
@@ -57,7 +57,7 @@ def test_another_machine_may_not_have_files_opened_here(tiny_bundle: Path, tmp_p
         server.addresses["control"] = f"tcp://{address}:{port}"
         said = [server.ask(asked | {"file": file})["error"] for file in (str(path), "/nowhere.obj")]
         assert said[0] == said[1], "it does not tell what is there"
-        assert "only clients there may ask; put the mesh into" in said[0]
+        assert "only a client on that machine may ask; put the mesh into" in said[0]
         assert "club" not in server.ask({"op": "objects"})["objects"]
         server.addresses["control"] = f"tcp://127.0.0.1:{port}"
         assert server.ask(asked) == {"object": "club"}

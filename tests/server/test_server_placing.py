@@ -157,12 +157,12 @@ BAD = [
     ({"reference": "Ball"}, "reference is 'Ball'; allowed are Box"),
     ({"sheet": [1, 2]}, "left_wrist is not tracked"),
     ({"actor": "ann"}, "actor is 'ann'; allowed are actor"),
-    ({"op": "place_object", "body": "Ball"}, "body 'Ball' carries nothing that could be placed; allowed are Box"),
-    ({"op": "place_object", "body": "left_wrist"}, "carries nothing that could be placed; allowed are Box"),
+    ({"op": "place_object", "body": "Ball"}, "body 'Ball' does not carry an object; allowed are Box"),
+    ({"op": "place_object", "body": "left_wrist"}, "does not carry an object; allowed are Box"),
     ({"op": "place_object", "body": "Box", "position": [0, 1]}, "position is [0, 1]; it must be 3 numbers"),
     ({"op": "place_object", "body": "Box", "position": [0, "x", 1]}, "position is 'x'; it must be a number"),
     ({"op": "place_object", "body": "Box", "rotation": [0, 0, 0, 0]}, "rotation is zero"),
-    ({"op": "place_object", "body": "Box", "store": "no"}, "store is no; it must be true or false"),
+    ({"op": "place_object", "body": "Box", "store": "no"}, "store is 'no'; allowed are true and false"),
 ]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 import zmq
-from live_server import FREE_PORTS, serving
+from live_server import free_ports, serving
 from tiny_bundle import write_tiny_bundle
 
 from manipnet import cli
@@ -22,7 +22,7 @@ CUBE = LIBRARY_FOLDER / "cube.ply"
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals for another process")
 def test_ready_names_every_address_and_a_signal_ends_it_with_status_0(tiny_bundle: Path, how: int) -> None:
     with serving("--model", str(tiny_bundle), "--metrics-port", "0") as server:
-        assert list(server.addresses) == ["hands", "bodies", "control", "osc", "page", "web", "metrics"]
+        assert list(server.addresses) == ["hands", "web", "bodies", "osc", "control", "page", "metrics"]
         with urllib.request.urlopen(server.addresses["metrics"], timeout=20.0) as response:
             text = response.read().decode()
         assert 'manipnet_frames_in_total{source="zmq"} 0.0' in text
@@ -48,7 +48,7 @@ def test_a_port_in_use_is_named_with_its_option(
         if kind == socket.SOCK_STREAM:
             taken.listen()
         port = str(taken.getsockname()[1])
-        assert cli.main([*FREE_PORTS, option, port, "--model", str(tiny_bundle)]) == 1
+        assert cli.main([*free_ports(), option, port, "--model", str(tiny_bundle)]) == 1
     error = capsys.readouterr().err
     assert option in error
     assert port in error
@@ -58,17 +58,17 @@ def test_a_port_in_use_is_named_with_its_option(
     ("options", "complaint"),
     [
         (["--model", "colossus"], "model 'colossus' is no folder and no shipped bundle"),
-        (["--mesh", "Box"], "'Box' is no NAME=FILE"),
+        (["--mesh", "Box"], "'Box' is not NAME=FILE"),
         (["--mesh", "Box=nowhere.obj"], "nowhere.obj: no such file"),
         (["--mesh", "Box=readme.txt"], "readme.txt: .txt format is unknown; allowed are .obj, .ply, .stl, .glb"),
         (["--rig", "nowhere.toml"], "nowhere.toml: cannot be read"),
-        (["--rig", "r.toml", "--mesh", "Box=x.obj"], "--rig names the objects itself"),
+        (["--rig", "r.toml", "--mesh", "Box=x.obj"], "--rig cannot be combined with --mesh or --demo"),
         (["--host", "0.0.0.0"], "--host 0.0.0.0 can be reached from other machines"),
         (["--host", "0.0.0.0", "--keys", "keys"], "--allow NETWORK for OSC"),
-        (["--allow", "stage"], "'stage' is no address or network"),
-        (["--look-ahead", "2"], "look_ahead is 2.0 s; allowed are 0 … 0.5 s"),
-        (["--port", "99999"], "--port is 99999; allowed are 0 (any free one) … 65535"),
-        (["--vmc", "host:port"], "'host:port' is no HOST[:PORT]"),
+        (["--allow", "stage"], "--allow is ['stage']; it must be addresses or networks"),
+        (["--look-ahead", "2"], "--look-ahead is '2'; it must be a number of seconds, 0 … 0.5"),
+        (["--port", "99999"], "--port is '99999'; it must be a port number, 0 … 65535"),
+        (["--vmc", "host:port"], "--vmc is 'host:port'; it must be HOST or HOST:PORT"),
     ],
 )
 def test_what_cannot_be_served_is_said_in_one_line(

@@ -8,7 +8,7 @@ from live_server import Stage, Subscriber, scene
 
 from manipnet.actors.output_guard import MAX_SPEED_RAD_S
 from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
-from manipnet.tracking.timeline import TICK_S
+from manipnet.tracking.tick import TICK_S
 from manipnet.wire import TOPIC_BIN, HandsMessage
 
 

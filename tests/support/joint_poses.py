@@ -1,4 +1,4 @@
-"""Joint poses worked out by hand in every engine's axes."""
+"""Joint poses that were worked out by hand in the axes of every engine."""
 
 import json
 
@@ -13,7 +13,7 @@ TOLERANCE_RAD = 1e-4
 
 
 def assert_joints(engine, convert):
-    """`convert (7,) -> (7,)` gives every pose, joint angle and axis as the hand-made vectors say."""
+    """Assert that `convert (7,) -> (7,)` gives the poses, joint angles and axes of `axes.json`."""
     for pose in POSES:
         parent, child = (np.asarray(convert(np.array(pose[part]["project"]))) for part in ("parent", "child"))
         for got, part in ((parent, "parent"), (child, "child")):

@@ -1,4 +1,4 @@
-"""The engine-free clients of other languages, each as a command that speaks the harness's text protocol."""
+"""Builds the engine-free clients of all languages as commands that speak the text protocol of the harnesses."""
 
 import json
 import os
@@ -17,15 +17,15 @@ CPP = CLIENTS / "unreal" / "ManipNetLiveLink" / "Source" / "ManipNetLiveLink" / 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Wconversion", "-Werror")
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 NAMES = ("csharp", "gcc-sanitized", "gcc-threads", "clang", "javascript", "python")
-"""The C++ is built thrice: with gcc and its address and undefined-behaviour sanitizers, with gcc and its thread
-sanitizer, and optimised with clang."""
+"""C++ is built by gcc with its address and undefined-behaviour sanitizers, by gcc with its thread sanitizer, and with
+optimisation by clang."""
 
 SMALL_NURSERY = {"MONO_GC_PARAMS": "nursery-size=64k"}
-"""Mono then collects after 64 kB: no collection in n frames means less than 64 kB / n for each."""
+"""Mono then collects after 64 kB, so no collection in n frames means less than 64 kB / n per frame."""
 
 
 def build(name: str, folder: Path) -> list[str]:
-    """The command that runs a client's harness; skips the test where its tools are missing."""
+    """Build a client's harness and return the command that runs it; skips the test where tools are missing."""
     builders = {
         "csharp": _csharp,
         "gcc-sanitized": lambda folder: _gcc(folder, *SANITIZERS),
@@ -63,13 +63,13 @@ def _cpp(compiler: str, exe: Path, *options: str) -> list[str]:
 
 def _javascript(_: Path) -> list[str]:
     (node,) = need("node")
-    # Before version 22 node's own WebSocket has to be asked for.
+    # Node's own WebSocket must be enabled before version 22.
     options = ["--no-warnings", "--experimental-websocket", "--expose-gc", "--max-semi-space-size=64"]
     return [node, *options, str(HARNESSES / "web" / "harness.mjs")]
 
 
 def run(command: list[str], *words: str, text: str = "") -> list[str]:
-    """Lines a harness prints."""
+    """Run a harness to its end and return the lines that it prints."""
     done = subprocess.run([*command, *words], input=text, capture_output=True, encoding="utf-8", timeout=120)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
@@ -77,19 +77,19 @@ def run(command: list[str], *words: str, text: str = "") -> list[str]:
 
 @dataclass
 class LiveClient:
-    """A harness connected to a server: every question gets a line of figures."""
+    """A running harness connected to a server; it answers each line with a line of figures."""
 
     process: subprocess.Popen
 
     @classmethod
     def start(cls, command: list[str], address: str, verb: str = "live") -> "LiveClient":
-        """Run the harness's `live` or `idle`."""
+        """Start the harness with `live` or `idle`."""
         pipe, environment = subprocess.PIPE, {**os.environ, **SMALL_NURSERY}
         words = [*command, verb, address]
         return cls(subprocess.Popen(words, stdin=pipe, stdout=pipe, encoding="utf-8", env=environment))
 
     def ask(self, what: str = "") -> Any:
-        """The client's figures as of now, or its "arrivals": number and time of every frame since they were told."""
+        """The client's present figures, or with "arrivals" number and time of every frame since the last such call."""
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.process.stdin.write(f"{what}\n")
@@ -97,18 +97,18 @@ class LiveClient:
         return json.loads(self.process.stdout.readline())
 
     def ask_until(self, condition, limit_s: float = 30.0) -> dict:
-        """Ask until the figures meet a condition."""
+        """Ask again and again until the figures meet a condition."""
         give_up = time.monotonic() + limit_s
         while not condition(figures := self.ask()):
             assert time.monotonic() < give_up, figures
         return figures
 
     def close(self) -> tuple[str, int]:
-        """End it by the end of its input; its last words and its exit status."""
+        """Close the harness's input; returns its last output and its exit status."""
         rest, _ = self.process.communicate(timeout=30)
         return rest.strip(), self.process.returncode
 
     def kill(self) -> None:
-        """Whatever state it is in."""
+        """Kill the harness, whatever its state."""
         self.process.kill()
         self.process.communicate()

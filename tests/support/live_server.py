@@ -16,7 +16,9 @@ from typing import Any
 import msgpack
 import zmq
 
-from manipnet.config.settings import is_loopback
+from manipnet.common.options import Port
+from manipnet.config.settings import all_options
+from manipnet.net.addresses import is_loopback
 from manipnet.net.curve_keys import ClientKeys
 from manipnet.net.zap import secure_client
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, decode_binary, decode_msgpack
@@ -24,14 +26,19 @@ from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, decode_binary,
 PATIENCE_S = 60.0
 START_S = 300.0
 """The first start after a change compiles everything, perhaps on a busy machine."""
-FREE_PORTS = [f"--{name}=0" for name in ("port", "input-port", "control-port", "osc-port", "page-port", "web-port")]
+
+
+def free_ports() -> list[str]:
+    """Options with which a server takes any free port wherever it listens."""
+    options = all_options().values()
+    return [f"{each.flag}=0" for each in options if isinstance(each.kind, Port) and each.default is not None]
 
 
 class LiveServer:
     """`manipnet-serve` on free ports: its addresses, its lines, its end."""
 
-    def __init__(self, *options: str) -> None:
-        command = [sys.executable, "-m", "manipnet.cli", *FREE_PORTS, *options]
+    def __init__(self, *options: str, program: Sequence[str] = ("-m", "manipnet.cli")) -> None:
+        command = [sys.executable, *program, *free_ports(), *options]
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.lines: queue.Queue[str] = queue.Queue()
         self.errors: list[str] = []
@@ -77,9 +84,9 @@ class LiveServer:
 
 
 @contextmanager
-def serving(*options: str) -> Iterator[LiveServer]:
+def serving(*options: str, program: Sequence[str] = ("-m", "manipnet.cli")) -> Iterator[LiveServer]:
     """A server that is ready; stopped at the end, whatever happened."""
-    server = LiveServer(*options)
+    server = LiveServer(*options, program=program)
     try:
         yield server.wait_ready()
     finally:

@@ -1,4 +1,4 @@
-"""Publish moving hands as `manipnet-serve` does, from the schema alone, on a port that `ready` tells."""
+"""Publish moving hands as `manipnet-serve` does, without a server; the line `ready` names the addresses."""
 
 import argparse
 import itertools
@@ -7,7 +7,7 @@ import time
 import numpy as np
 import zmq
 
-from manipnet.outputs.websocket import WebSocketPublisher
+from manipnet.outputs.websocket.server import WebSocketPublisher
 from manipnet.telemetry import Telemetry
 from manipnet.wire import (
     TOPIC_BIN,
@@ -18,13 +18,17 @@ from manipnet.wire import (
     encode_binary,
     encode_msgpack,
 )
+from manipnet.wire.hands import Side
 
 RATE_HZ = 60
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def hand(x_m: float, turn_rad: float) -> HandPose:
-    """A hand at `(x, 0, 0)` turned about z, every joint like the wrist, every angle the turn, every bone a quarter."""
+    """A hand at `(x, 0, 0)`, turned about z: every joint equals the wrist, every angle equals the turn.
+
+    Every bone is turned by a quarter of it about y.
+    """
     quat = np.array([0.0, 0.0, np.sin(turn_rad / 2), np.cos(turn_rad / 2)])
     pose = np.array([x_m, 0.0, 0.0, *quat])
     rotations = np.tile([0.0, np.sin(turn_rad / 8), 0.0, np.cos(turn_rad / 8)], (17, 1))
@@ -33,9 +37,9 @@ def hand(x_m: float, turn_rad: float) -> HandPose:
 
 
 def message(seq: int, t_capture: float, x_m: float, session: str = "s") -> HandsMessage:
-    """Both hands at `x`, turned by `x` radians, and a cube."""
+    """A message with both hands at `x`, turned by `x` and `-x` radians, and a cube at `x`."""
     body = BodyPose(True, np.array([x_m, 0.0, 0.0, *IDENTITY]), "cube")
-    hands = {"left": hand(x_m, x_m), "right": hand(x_m, -x_m)}
+    hands: dict[Side, HandPose] = {"left": hand(x_m, x_m), "right": hand(x_m, -x_m)}
     return HandsMessage(session, "actor", seq, t_capture, time.monotonic(), 0.5, hands, (body,))
 
 
@@ -45,7 +49,9 @@ def main() -> None:
     parser.add_argument("--websocket-port", type=int, default=0)
     parser.add_argument("--session", default="s")
     parser.add_argument("--rate", type=float, default=RATE_HZ)
-    parser.add_argument("--skip", type=int, default=0, help="leave out every so-manieth frame, as a network does")
+    parser.add_argument(
+        "--skip", type=int, default=0, help="leave out every N-th frame, as a lossy network does", metavar="N"
+    )
     options = parser.parse_args()
     socket = zmq.Context.instance().socket(zmq.PUB)
     socket.setsockopt(zmq.LINGER, 0)
@@ -54,7 +60,7 @@ def main() -> None:
     port = options.port or socket.bind_to_random_port("tcp://127.0.0.1")
     if options.port:
         socket.bind(f"tcp://127.0.0.1:{port}")
-    websocket = WebSocketPublisher("127.0.0.1", options.websocket_port, Telemetry())
+    websocket = WebSocketPublisher(Telemetry(), "127.0.0.1", options.websocket_port)
     print(f"ready tcp://127.0.0.1:{port} {websocket.address}", flush=True)
     start = time.monotonic()
     for seq in itertools.count():

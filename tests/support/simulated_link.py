@@ -1,4 +1,4 @@
-"""A network that loses, delays, reorders and doubles: by a seed, so that every run meets the same bad luck."""
+"""A network that loses, delays, reorders and duplicates packets, repeatably by a seed."""
 
 import heapq
 import itertools
@@ -15,8 +15,8 @@ from manipnet.demo.player import connectable
 
 
 @dataclass(frozen=True)
-class Weather:
-    """Shares of packets in [0, 1], times in seconds. `reorder` holds back that share by `held_s` more."""
+class LinkQuality:
+    """How bad a network is: shares of packets in [0, 1] and times. The share `reorder` is delayed by `held_s` more."""
 
     loss: float = 0.0
     delay_s: float = 0.0
@@ -28,52 +28,52 @@ class Weather:
     def __str__(self) -> str:
         return (
             f"{100 * self.loss:g} % loss, {1e3 * self.delay_s:g} ± {1e3 * self.jitter_s:g} ms, "
-            f"{100 * self.reorder:g} % reordered, {100 * self.duplicate:g} % doubled"
+            f"{100 * self.reorder:g} % reordered, {100 * self.duplicate:g} % duplicated"
         )
 
 
 class Link:
-    """Decides packet by packet. Pure but for its own random numbers."""
+    """Decides the fate of each packet, with random numbers of its own."""
 
-    def __init__(self, weather: Weather, seed: int) -> None:
-        self._weather, self._random = weather, random.Random(seed)
+    def __init__(self, quality: LinkQuality, seed: int) -> None:
+        self._quality, self._random = quality, random.Random(seed)
 
     def delays_s(self) -> list[float]:
-        """When to deliver the next packet, counted from its arrival: never, once, or twice."""
-        weather, rng = self._weather, self._random
-        lost, doubled, held = (rng.random() < share for share in (weather.loss, weather.duplicate, weather.reorder))
+        """The delays after which to deliver the next packet: none for a lost one, two for a duplicated one."""
+        quality, rng = self._quality, self._random
+        lost, doubled, held = (rng.random() < share for share in (quality.loss, quality.duplicate, quality.reorder))
         delays = [
-            max(weather.delay_s + rng.uniform(-weather.jitter_s, weather.jitter_s) + held * weather.held_s, 0.0)
+            max(quality.delay_s + rng.uniform(-quality.jitter_s, quality.jitter_s) + held * quality.held_s, 0.0)
             for _ in range(2)
         ]
         return [] if lost else delays[: 1 + doubled]
 
 
 class Proxy:
-    """Passes messages on through a link, in threads of its own, from construction to `close`.
+    """Forwards messages through a link, on its own threads, from construction to `close`.
 
-    `receive` waits a short time for a message and returns None without one; `send` is called in one thread only.
+    `receive` waits a short time for a message and returns None when none came; only one thread calls `send`.
     """
 
     def __init__(
-        self, weather: Weather, seed: int, receive: Callable[[], bytes | None], send: Callable[[bytes], object]
+        self, quality: LinkQuality, seed: int, receive: Callable[[], bytes | None], send: Callable[[bytes], object]
     ) -> None:
         self.passed = self.lost = 0
         self.blackhole = False
-        """While set, nothing gets through."""
-        self._link, self._receive, self._send = Link(weather, seed), receive, send
+        """While this is set, no message gets through."""
+        self._link, self._receive, self._send = Link(quality, seed), receive, send
         self._waiting: list[tuple[float, int, bytes]] = []
         self._order = itertools.count()
-        self._news, self._stopping = threading.Condition(), threading.Event()
+        self._changed, self._stopping = threading.Condition(), threading.Event()
         self._threads = [threading.Thread(target=run, daemon=True) for run in (self._take, self._deliver)]
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
-        """Stop; what is on its way is lost."""
+        """Stop; messages that are still delayed are lost."""
         self._stopping.set()
-        with self._news:
-            self._news.notify()
+        with self._changed:
+            self._changed.notify()
         for thread in self._threads:
             thread.join()
 
@@ -88,17 +88,17 @@ class Proxy:
                 self.lost += 1
                 continue
             self.passed += 1
-            with self._news:
+            with self._changed:
                 for delay_s in delays:
                     heapq.heappush(self._waiting, (now_s + delay_s, next(self._order), message))
-                self._news.notify()
+                self._changed.notify()
 
     def _deliver(self) -> None:
         while not self._stopping.is_set():
-            with self._news:
+            with self._changed:
                 due_s = self._waiting[0][0] if self._waiting else time.monotonic() + 1.0
                 if due_s > time.monotonic():
-                    self._news.wait(due_s - time.monotonic())
+                    self._changed.wait(due_s - time.monotonic())
                     continue
                 message = heapq.heappop(self._waiting)[2]
             if not self.blackhole:
@@ -106,16 +106,16 @@ class Proxy:
 
 
 class UdpProxy(Proxy):
-    """Datagrams sent to `address` reach `target` (`udp://HOST:PORT`), all from one source."""
+    """Forwards datagrams from `address` to `target` (`udp://HOST:PORT`), all from one source port."""
 
-    def __init__(self, target: str, weather: Weather, seed: int) -> None:
+    def __init__(self, target: str, quality: LinkQuality, seed: int) -> None:
         self._inside = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._inside.bind(("127.0.0.1", 0))
         self._inside.settimeout(0.05)
         self._outside = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._outside.connect(connectable(target.replace("udp:", "tcp:")))
         self.address = f"udp://127.0.0.1:{self._inside.getsockname()[1]}"
-        super().__init__(weather, seed, self._read, self._outside.send)
+        super().__init__(quality, seed, self._read, self._outside.send)
 
     def close(self) -> None:
         super().close()
@@ -130,12 +130,13 @@ class UdpProxy(Proxy):
 
 
 class ZmqProxy(Proxy):
-    """Body messages sent to `address` by a PUB that connects reach `target` (`tcp://HOST:PORT`).
+    """Forwards body messages from a PUB socket that connects to `address` to `target` (`tcp://HOST:PORT`).
 
-    Over TCP a network cannot lose or reorder; this does what relays and senders on bad links do to whole messages.
+    A network cannot lose or reorder data inside TCP; this simulates what relays and senders on bad links do to whole
+    messages.
     """
 
-    def __init__(self, target: str, weather: Weather, seed: int) -> None:
+    def __init__(self, target: str, quality: LinkQuality, seed: int) -> None:
         self._context = zmq.Context()
         self._inside, self._outside = self._context.socket(zmq.SUB), self._context.socket(zmq.XPUB)
         for side in (self._inside, self._outside):
@@ -146,7 +147,7 @@ class ZmqProxy(Proxy):
         self._outside.connect(target)
         if not self._outside.poll(10_000):
             raise TimeoutError(f"nobody subscribes at {target}")
-        super().__init__(weather, seed, self._read, self._outside.send)
+        super().__init__(quality, seed, self._read, self._outside.send)
 
     def close(self) -> None:
         super().close()

@@ -12,9 +12,8 @@ import pytest
 from tiny_bundle import write_tiny_bundle
 from written_scene import scenes_at
 
-from manipnet.actors.actor import ShownHand
 from manipnet.actors.hands_message import hand_poses
-from manipnet.actors.transitions import Shown
+from manipnet.actors.transitions import ShownHand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.ik.pose import FEEDBACK_SHARE
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
@@ -60,8 +59,10 @@ def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
 
 def _in_world(scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
     """What clients get of each hand, its size a little off."""
-    shown = [Shown("live", step.angles, scene.wrist[PRESENT]) for scene, step in zip(scenes, steps, strict=True)]
-    pairs = [(scene.side, ShownHand(hand, None)) for scene, hand in zip(scenes, shown, strict=True)]
+    pairs = [
+        (scene.side, ShownHand("live", step.angles, scene.wrist[PRESENT], None))
+        for scene, step in zip(scenes, steps, strict=True)
+    ]
     poses = list(hand_poses(dict(pairs[:2]), 1.1).values()) + list(hand_poses(dict(pairs[2:]), 1.1).values())
     return {"joints": [pose.joints for pose in poses], "local_rotations": [pose.rotations for pose in poses]}
 

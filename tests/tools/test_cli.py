@@ -1,5 +1,6 @@
-"""`manipnet VERB`: every verb explains itself, works, and says in one line what it cannot do."""
+"""`manipnet VERB`: every verb has a help text, works, and reports an error in one line."""
 
+import functools
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from live_server import scene
 
 from manipnet.recording.mcap_file import RecordingWriter, read_about
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+from manipnet.wire import SIDES
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
 
@@ -83,7 +85,7 @@ def test_synthesize_writes_both_hands(recording: Path, tiny_bundle: Path, tmp_pa
 
 def test_meshes_may_come_before_the_take(recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = str(tmp_path / "x.npz")
-    assert "--mesh Bax=b.ply: must be NAME=FILE with NAME one of Box" in error_of(
+    assert "--mesh Bax=b.ply: no object is called 'Bax'; the objects are Box" in error_of(
         capsys, "synthesize", "--mesh", f"Box={CUBE}", "--mesh", "Bax=b.ply", str(recording), "--out", out
     )
     assert "no --mesh" in error_of(capsys, "synthesize", str(recording), "--out", out)
@@ -104,10 +106,41 @@ def test_what_cannot_be_done_is_one_line(
     assert "pip install 'manipnet-live[train]'" in error_of(capsys, "train", "--data", ".", "--out", ".")
 
 
-def test_recover_mends_a_file(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_recover_repairs_a_recording(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     content = recording.read_bytes()
     recording.write_bytes(content[: len(content) * 2 // 3])
-    mended = tmp_path / "mended.mcap"
-    assert cli.main(["recover", str(recording), "--out", str(mended)]) == 0
-    assert "was cut off or damaged" in capsys.readouterr().err.replace("\n", " ")
-    assert read_about(mended).whole
+    repaired = tmp_path / "repaired.mcap"
+    assert cli.main(["recover", str(recording), "--out", str(repaired)]) == 0
+    assert f"{recording} was cut off or damaged; wrote {repaired}: " in capsys.readouterr().err
+    assert read_about(repaired).whole
+
+
+@pytest.mark.parametrize(
+    ("arguments", "printed"),
+    [
+        ("recover RECORDING --out DEEP/r.mcap", "wrote DEEP/r.mcap: "),
+        ("record --bodies-port 0 --seconds 0.1 --out DEEP/r.mcap", "wrote DEEP/r.mcap: "),
+        ("synthesize RECORDING --mesh Box=CUBE --model MODEL --out DEEP/s.npz", "wrote DEEP/s.npz: "),
+        ("export FINGERS --format csv --out DEEP/e.csv", "wrote DEEP/e.csv: "),
+        ("batch TAKES --out OUT", "broken failed: is not a CSV export of Motive"),
+    ],
+)
+def test_long_paths_and_brackets_are_printed_as_they_are(
+    arguments: str, printed: str, recording: Path, tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    deep = tmp_path / "takes" / "[a]" / ("x" * 100) / ("y" * 100)
+    deep.mkdir(parents=True)
+    (deep / "broken.csv").write_text("nothing")
+    joints, bones = np.zeros((2, 22, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 17, 1))
+    hands = {f"{side}_positions": joints for side in SIDES} | {f"{side}_rotations": bones for side in SIDES}
+    np.savez(tmp_path / "fingers.npz", time=np.arange(2) / 60, **hands)
+    names = {"RECORDING": recording, "CUBE": CUBE, "MODEL": tiny_bundle, "FINGERS": tmp_path / "fingers.npz"}
+    names |= {"DEEP": deep, "TAKES": tmp_path / "takes", "OUT": tmp_path / "out"}
+
+    def filled(text: str) -> str:
+        return functools.reduce(lambda text, name: text.replace(name, str(names[name])), names, text)
+
+    status = cli.main([filled(word) for word in arguments.split()])
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if filled(printed) in line]
+    assert status == int("batch" in arguments)
+    assert "[a]" in line

@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from manipnet.geometry import Array, quat_exp, quat_log, quat_multiply, quat_normalize
 from manipnet.synthesis.model.layout import WINDOW_OFFSETS_S
-from manipnet.tracking.timeline import MAX_BACKLOG, SILENCE_S, TICK_S, Tick, Timeline
+from manipnet.tracking.arrivals import SILENCE_S
+from manipnet.tracking.tick import TICK_S, Tick
+from manipnet.tracking.timeline import MAX_BACKLOG, Timeline
 
 VELOCITY = np.array([0.3, -0.2, 0.1])
 SPIN = np.array([0.5, 1.5, -0.7])

@@ -1,8 +1,7 @@
-"""Write the golden vectors: messages in both encodings, what a reader must make of them, and broken ones.
+"""Write the golden vectors: messages in both encodings, the values that a reader must find, and broken messages.
 
-Run `python tests/vectors/make_vectors.py` after a change of the schema; a test fails while files and schema
-differ. All numbers are exact binary fractions or normalised by one square root, so every machine writes the
-same bytes.
+Run `python tests/vectors/make_vectors.py` after a change of the schema; a test fails while files and schema differ. All
+numbers are exact binary fractions or normalised by one square root, so every machine writes the same bytes.
 """
 
 import json
@@ -21,7 +20,7 @@ FOLDER = Path(__file__).parent
 
 
 def floats(count: int, seed: int) -> np.ndarray:
-    """Deterministic fractions in (-1, 1), none of them symmetric in any axis."""
+    """Deterministic fractions in (-1, 1) without any symmetry between axes."""
     return np.array([((37 * i + 11 * seed + 5) % 127 - 63) / 64.0 for i in range(count)])
 
 
@@ -32,7 +31,7 @@ def quats(count: int, seed: int) -> np.ndarray:
 
 
 def as_f32(values: np.ndarray) -> np.ndarray:
-    """What survives the binary encoding, so that both encodings carry the same numbers."""
+    """Round to 32 bits, as the binary encoding does, so that both encodings carry the same numbers."""
     return values.astype(np.float32).astype(np.float64)
 
 
@@ -72,7 +71,7 @@ def messages() -> dict[str, HandsMessage]:
 
 
 def expected(message: HandsMessage) -> dict[str, Any]:
-    """A message as plain values; names as the binary encoding carries them."""
+    """A message as plain values, with names as the binary encoding carries them."""
 
     def name(text: str) -> str:
         return text.encode()[:63].decode(errors="ignore")
@@ -101,8 +100,14 @@ def expected(message: HandsMessage) -> dict[str, Any]:
     }
 
 
+def offset(record: np.dtype, field: str) -> int:
+    """The byte offset of a field in a record."""
+    fields: Any = record.fields
+    return fields[field][1]
+
+
 def longer_records(message: HandsMessage) -> bytes:
-    """The message as a later writer of version 1 might send it: more at the end of every record."""
+    """The message as a later writer of version 1 might send it, with more fields at the end of every record."""
     payload, out = encode_binary(message), bytearray()
     starts = [
         (HEADER.itemsize, 1, 8),
@@ -115,36 +120,34 @@ def longer_records(message: HandsMessage) -> bytes:
             out += payload[at : at + size] + b"\xa5" * extra
             at += size
     sizes = [HEADER.itemsize + 8, len(out), HAND.itemsize + 16, BODY.itemsize + 4]
-    struct.pack_into("<HIHH", out, PREAMBLE.fields["header_size"][1], *sizes)
+    struct.pack_into("<HIHH", out, offset(PREAMBLE, "header_size"), *sizes)
     return bytes(out)
 
 
 def broken(good: bytes) -> dict[str, bytes]:
-    """Payloads every reader must refuse, by what is wrong with them."""
+    """Payloads that every reader must refuse, by what is wrong with them."""
 
     def patched(offset: int, data: bytes) -> bytes:
         return good[:offset] + data + good[offset + len(data) :]
 
-    def at(dtype: np.dtype, field: str, base: int = 0) -> int:
-        return base + dtype.fields[field][1]
-
-    hand_at, name_at = HEADER.itemsize, at(HAND, "object", HEADER.itemsize)
+    hand_at = HEADER.itemsize
+    name_at = hand_at + offset(HAND, "object")
     return {
         "empty": b"",
         "truncated_header": good[:100],
         "truncated_body": good[:-1],
         "trailing_byte": good + b"\0",
         "magic": patched(0, b"MNPX"),
-        "version_2": patched(at(PREAMBLE, "version"), b"\x02\0"),
-        "hand_size_small": patched(at(PREAMBLE, "hand_size"), b"\x10\0"),
-        "three_hands": patched(at(PREAMBLE, "hand_count"), b"\x03\0"),
-        "too_many_bodies": patched(at(PREAMBLE, "body_count"), b"\x01\x01"),
-        "side_2": patched(at(HAND, "side", hand_at), b"\x02"),
-        "same_side_twice": patched(at(HAND, "side", hand_at), b"\x01"),
-        "state_3": patched(at(HAND, "state", hand_at), b"\x03"),
-        "nan_angle": patched(at(HAND, "angles", hand_at), struct.pack("<f", math.nan)),
-        "infinite_joint": patched(at(HAND, "joints", hand_at), struct.pack("<f", math.inf)),
-        "infinite_time": patched(at(HEADER, "t_capture"), struct.pack("<d", -math.inf)),
+        "version_2": patched(offset(PREAMBLE, "version"), b"\x02\0"),
+        "hand_size_small": patched(offset(PREAMBLE, "hand_size"), b"\x10\0"),
+        "three_hands": patched(offset(PREAMBLE, "hand_count"), b"\x03\0"),
+        "too_many_bodies": patched(offset(PREAMBLE, "body_count"), b"\x01\x01"),
+        "side_2": patched(hand_at + offset(HAND, "side"), b"\x02"),
+        "same_side_twice": patched(hand_at + offset(HAND, "side"), b"\x01"),
+        "state_3": patched(hand_at + offset(HAND, "state"), b"\x03"),
+        "nan_angle": patched(hand_at + offset(HAND, "angles"), struct.pack("<f", math.nan)),
+        "infinite_joint": patched(hand_at + offset(HAND, "joints"), struct.pack("<f", math.inf)),
+        "infinite_time": patched(offset(HEADER, "t_capture"), struct.pack("<d", -math.inf)),
         "name_length": patched(name_at, bytes([NAME.itemsize])),
         "name_not_utf8": patched(name_at, b"\x03\xff\xfe\xfd"),
     }

@@ -23,7 +23,7 @@ SLICE_MS = 50
 """How often a wait checks whether it should end, because no other thread may close a ZeroMQ socket."""
 
 HIGH_WATER_MARK = 64
-FAILURES = {
+FAILURES: Mapping[int, str] = {
     zmq.Event.HANDSHAKE_FAILED_AUTH: "the server does not list this client's key (in its clients.allow)",
     zmq.Event.HANDSHAKE_FAILED_PROTOCOL: "the server does not use CURVE, or its key is not the one in this file",
     zmq.Event.HANDSHAKE_FAILED_NO_DETAIL: "the server refused this client; check that its key is the one in this file",
@@ -63,7 +63,7 @@ class SecureConnection:
         self._interrupted = False
         self._context = zmq.Context()
         self._socket = self._context.socket(socket_type)
-        self._events = self._socket.get_monitor_socket(zmq.Event.HANDSHAKE_SUCCEEDED | sum(FAILURES, zmq.Event(0)))
+        self._events = self._socket.get_monitor_socket(zmq.Event.HANDSHAKE_SUCCEEDED | sum(FAILURES))
         self._poller = zmq.Poller()
         self._poller.register(self._socket, zmq.POLLIN)
         self._poller.register(self._events, zmq.POLLIN)

@@ -1,15 +1,14 @@
-"""From the hands an actor shows to the message clients get."""
+"""From the hands that an actor shows to the message that clients receive."""
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from manipnet.actors.actor import Actor, ShownHand
-from manipnet.actors.transitions import HOLD_AFTER_S
+from manipnet.actors.actor import Actor
+from manipnet.actors.transitions import HOLD_AFTER_S, ShownHand
 from manipnet.synthesis.hand.openxr import pose_in_world
-from manipnet.synthesis.synthesizer import Side
-from manipnet.tracking.timeline import Tick
-from manipnet.wire import BodyPose, HandPose, HandsMessage, Latency
+from manipnet.tracking.tick import Tick
+from manipnet.wire import BodyPose, HandPose, HandsMessage, Latency, Side
 
 
 def hands_message(
@@ -20,7 +19,7 @@ def hands_message(
     t_publish: float,
     latency: Latency,
 ) -> HandsMessage:
-    """The message of one tick; takes the actor's next sequence number."""
+    """The message of one tick; it takes the actor's next sequence number."""
     message = HandsMessage(
         session=session,
         actor=actor.config.name,
@@ -39,20 +38,20 @@ def hands_message(
 
 
 def hand_poses(hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, HandPose]:
-    """What is shown of each hand, with its joints in the world; `scale` is the hand's size over the model's."""
+    """Each hand with its joints in the world; `scale` is the size of the hands relative to the model's."""
     if not hands:
         return {}
-    shown = [hand.shown for hand in hands.values()]
-    angles, wrists = np.array([hand.angles for hand in shown]), np.array([hand.wrist for hand in shown])
-    local, joints = pose_in_world(list(hands), angles, wrists, scale)
+    angles = np.array([hand.angles for hand in hands.values()])
+    wrists = np.array([hand.wrist for hand in hands.values()])
+    rotations, joints = pose_in_world(list(hands), angles, wrists, scale)
     return {
         side: HandPose(
-            state=hand.shown.state,
+            state=hand.state,
             object=hand.prop,
             scale=scale,
-            angles=hand.shown.angles,
-            rotations=local[i],
-            wrist=hand.shown.wrist,
+            angles=hand.angles,
+            rotations=rotations[i],
+            wrist=hand.wrist,
             joints=joints[i],
         )
         for i, (side, hand) in enumerate(hands.items())

@@ -1,88 +1,92 @@
-"""What is shown of a hand while its tracking comes and goes: live, hold, rest, and never a jump between them."""
+"""What is shown of a hand while its tracking comes and goes: live, held or at rest, without a jump in between.
+
+Inertialization (Bollo 2018, "Inertialization: High-Performance Animation Transitions in Gears of War") hides a change
+of source: the pose that is shown is the new source plus an offset, which starts as the gap and decays to zero.
+"""
 
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from manipnet.actors.output_guard import OutputGuard
 from manipnet.geometry import Array, quat_conjugate, quat_exp, quat_log, quat_multiply
-
-State = Literal["live", "hold", "rest"]
+from manipnet.wire import State
 
 HOLD_AFTER_S: Final = 0.1
 REST_AFTER_S: Final = 0.5
-"""Without a tracked sample for this long, a body's hand is held, and then eases to the rest pose."""
+"""After this long without a tracked sample a hand is held, and then eases to the rest pose."""
 
 RETURN_HALF_LIFE_S: Final = 0.06
-"""Back to live: nine tenths of the way in 0.2 s."""
+"""For a return to live: nine tenths of the gap are closed within 0.2 s."""
 REST_HALF_LIFE_S: Final = 0.2
 
 CLOSED: Final = 1e-6
-"""A gap below a micrometre or a microradian is none."""
+"""Offsets below a micrometre or a microradian count as closed."""
 
 _TOLERANCE_S: Final = 1e-6
 
 
 def state_at_age(age_s: float) -> State:
-    """State of a hand whose tracking is `age_s` old; an age of infinity is a body never seen."""
+    """State of a hand whose tracking is `age_s` old; an age of infinity means a body that was never tracked."""
     if age_s <= HOLD_AFTER_S + _TOLERANCE_S:
         return "live"
     return "hold" if age_s <= REST_AFTER_S + _TOLERANCE_S else "rest"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shown:
-    """What one hand shows at one tick: `angles (20,)`, `wrist (7,)` in the world."""
+class ShownHand:
+    """One hand as it is shown at one tick: `angles (20,)` rad, `wrist (7,)` in the world, and the prop it is at."""
 
     state: State
     angles: Array
     wrist: Array
+    prop: str | None
 
 
 class InertializationOffset:
-    """The gap between what is shown and what should be: opened by a change of source, closed by a critically
-    damped spring, so what is shown neither jumps nor overshoots."""
+    """The offset of what is shown from its source, which a critically damped spring closes without overshoot."""
 
     def __init__(self, size: int) -> None:
-        self.gap = np.zeros(size)
+        self.offset = np.zeros(size)
         self._speed = np.zeros(size)
         self._open = False
 
-    def open(self, gap: Array) -> None:
-        """Start from a new gap, at rest."""
-        self.gap, self._speed, self._open = gap, np.zeros_like(gap), True
+    def open(self, offset: Array) -> None:
+        """Start from a new offset, at rest."""
+        self.offset, self._speed, self._open = offset, np.zeros_like(offset), True
 
-    def change(self, gap: Array) -> None:
-        """Go on from another gap, closing it as fast as the one before."""
-        self.gap, self._open = gap, True
+    def change(self, offset: Array) -> None:
+        """Replace the offset and keep its speed."""
+        self.offset, self._open = offset, True
 
     def close(self, dt_s: float, half_life_s: float) -> Array:
-        """The gap `dt_s` later; `half_life_s` is about the time in which half of it closes."""
+        """The offset `dt_s` later; about half of it closes within `half_life_s`."""
         if not self._open:
-            return self.gap
+            return self.offset
         stiffness = 2.0 * math.log(2.0) / half_life_s
-        pull = self._speed + stiffness * self.gap
+        pull = self._speed + stiffness * self.offset
         decay = math.exp(-stiffness * dt_s)
-        self.gap = decay * (self.gap + pull * dt_s)
+        self.offset = decay * (self.offset + pull * dt_s)
         self._speed = decay * (self._speed - stiffness * pull * dt_s)
-        if np.abs(self.gap).max() < CLOSED:
-            self.gap, self._speed, self._open = np.zeros_like(self.gap), np.zeros_like(self.gap), False
-        return self.gap
+        if np.abs(self.offset).max() < CLOSED:
+            self.offset, self._speed, self._open = np.zeros_like(self.offset), np.zeros_like(self.offset), False
+        return self.offset
 
 
 class PoseTransition:
-    """One hand as it is shown from tick to tick."""
+    """Shows one hand from tick to tick and hides every change of source."""
 
     def __init__(self, rest_angles: Array, guard: OutputGuard) -> None:
+        """`rest_angles (20,)` are in radians."""
         self._rest_angles, self._guard = rest_angles, guard
         self._fingers, self._wrist = InertializationOffset(len(rest_angles)), InertializationOffset(6)
         self._finger_source: Hashable = None
         self._wrist_source: Hashable = None
-        self._guessed = False
-        self.shown: Shown | None = None
+        self._was_forecast = False
+        self.shown: ShownHand | None = None
 
     def show(
         self,
@@ -90,30 +94,30 @@ class PoseTransition:
         angles: Array | None,
         wrist: Array | None,
         run: int,
-        held: Hashable,
+        prop: str | None,
         dt_s: float,
         known: bool = True,
-    ) -> Shown | None:
-        """The hand at the next tick, `dt_s` after the last one.
+    ) -> ShownHand | None:
+        """The hand at the next tick, `dt_s` after the last one; None before its wrist was tracked.
 
         `angles (20,)` is the synthesised pose of a live hand; without it the fingers are held, or ease to rest.
-        `wrist (7,)` is the tracked pose, None where it is lost: then the last one stays; `known` is False where it
-        had to be guessed, because nothing newer has arrived. When the `run` of the stream or the object `held`
-        changes, after a guess, and when the wrist is somewhere else at once, the hand glides from what it showed.
-        None before a wrist was seen.
-        Raises `NotFiniteError` and changes nothing.
+        `wrist (7,)` is the tracked pose; None stands for a lost wrist, which stays where it was. `known` is False if
+        the wrist had to be forecast, because nothing newer has arrived. The hand glides from what it showed when the
+        `run` of the stream or the `prop` changes, after a forecast, and when the wrist is suddenly somewhere else.
+        Raises `NotFiniteError`, and then changes nothing.
         """
         self._guard.check(angles, wrist)
-        source = (state, run, held)
+        source = (state, run, prop)
         if self.shown is None:
             if wrist is None:
                 return None
             self._finger_source, self._wrist_source = source, run
-            self.shown = Shown(state, self._rest_angles if angles is None else self._guard.inside(angles), wrist)
+            fingers = self._rest_angles if angles is None else self._guard.inside(angles)
+            self.shown = ShownHand(state, fingers, wrist, prop)
         else:
             fingers = self._next_angles(self.shown.angles, state, angles, source, dt_s)
-            self.shown = Shown(state, fingers, self._next_wrist(self.shown.wrist, wrist, run, dt_s))
-        self._guessed = not known
+            self.shown = ShownHand(state, fingers, self._next_wrist(self.shown.wrist, wrist, run, dt_s), prop)
+        self._was_forecast = not known
         return self.shown
 
     def _next_angles(self, shown: Array, state: State, angles: Array | None, source: Hashable, dt_s: float) -> Array:
@@ -134,29 +138,31 @@ class PoseTransition:
         if self._wrist_source != source:
             self._wrist_source = source
             self._wrist.open(_gap(shown, wrist))
-        elif self._guessed:
+        elif self._was_forecast:
             self._wrist.change(_gap(shown, wrist))
-        wanted = _beside(wrist, self._wrist.close(dt_s, RETURN_HALF_LIFE_S))
-        if self._guard.is_reachable(*_apart(shown.tolist(), wanted.tolist()), dt_s):
+        wanted = _displaced(wrist, self._wrist.close(dt_s, RETURN_HALF_LIFE_S))
+        if self._guard.is_reachable(*_distance(shown.tolist(), wanted.tolist()), dt_s):
             return wanted
         self._wrist.open(_gap(shown, wrist))
         return shown
 
 
-def _apart(one: Sequence[float], other: Sequence[float]) -> tuple[float, float]:
-    """How far two poses are from each other, metres and radians; NumPy would take ten times as long for two."""
+def _distance(one: Sequence[float], other: Sequence[float]) -> tuple[float, float]:
+    """Distance of two poses in metres and radians; NumPy would take ten times as long for two."""
     cosine = abs(one[3] * other[3] + one[4] * other[4] + one[5] * other[5] + one[6] * other[6])
     return math.dist(one[:3], other[:3]), 2.0 * math.acos(min(cosine, 1.0))
 
 
 def _gap(shown: Array, wrist: Array) -> Array:
-    """What lies between two poses `(7,)`: a way and a rotation vector `(6,)`, world frame."""
+    """The offset `(6,)` of the pose `shown (7,)` from `wrist (7,)`: a displacement and a rotation vector, in the world
+    frame.
+    """
     turn = quat_log(quat_multiply(shown[3:], quat_conjugate(wrist[3:])))
     return np.concatenate([shown[:3] - wrist[:3], turn])
 
 
-def _beside(wrist: Array, gap: Array) -> Array:
-    """The pose that `gap` lies between it and `wrist`."""
+def _displaced(wrist: Array, gap: Array) -> Array:
+    """The pose `(7,)` whose offset from `wrist` is `gap (6,)`."""
     if not gap.any():
         return wrist
     return np.concatenate([wrist[:3] + gap[:3], quat_multiply(quat_exp(gap[3:]), wrist[3:])])

@@ -1,20 +1,23 @@
 """Rig files written: a whole configuration as one, and what was calibrated put into one that is there."""
 
-import os
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
-from manipnet.config.rig_reader import SERVER_KEYS, parse_rig
-from manipnet.config.settings import ActorConfig, BodyConfig, ConfigError, ObjectConfig, ServerConfig
-from manipnet.geometry import Array
+from manipnet.common.atomic_file import replacing
+from manipnet.common.options import ConfigError, to_toml
+from manipnet.config.rig_reader import parse_rig
+from manipnet.config.settings import ActorConfig, BodyConfig, ObjectConfig, ServerConfig, protocol_options
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
+
+if TYPE_CHECKING:
+    from manipnet.geometry import Array
 
 BACKUP_SUFFIX: Final = ".bak"
 _METRE_DIGITS, _QUATERNION_DIGITS = 6, 8
@@ -36,9 +39,9 @@ def rig_text(config: ServerConfig) -> str:
 
 
 def server_table(config: ServerConfig) -> dict[str, Any]:
-    """The table `[server]` of a configuration: every option that has a value."""
-    values = {key: getattr(config, "look_ahead_s" if key == "look_ahead" else key) for key in SERVER_KEYS}
-    return {key: _plain(value) for key, value in values.items() if value not in (None, ())}
+    """The table `[server]` of a configuration, with every option that has a value."""
+    declared = (config, *(config.of(options) for options in protocol_options()))
+    return {key: value for each in declared for key, value in to_toml(each).items()}
 
 
 def store(path: Path, actor: ActorConfig, backup: bool = True) -> Path:
@@ -66,19 +69,10 @@ def replace_file(path: Path, text: str, backup: bool = True) -> Path:
     if there is to be a `backup`. Returns the backup's path. Raises `OSError`.
     """
     kept = path.with_name(path.name + BACKUP_SUFFIX)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with open(part, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        if path.exists():
-            shutil.copymode(path, part)
-            if backup:
-                shutil.copy2(path, kept)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(path) as file:
+        file.write(text.encode("utf-8"))
+        if backup and path.exists():
+            shutil.copy2(path, kept)
     return kept
 
 
@@ -151,7 +145,7 @@ def _body(body: BodyConfig) -> Any:
     return table
 
 
-def _offset(offset: Array | None) -> dict[str, Any]:
+def _offset(offset: "Array | None") -> dict[str, Any]:
     if offset is None:
         return {}
     position = [round(float(x), _METRE_DIGITS) + 0.0 for x in offset[:3]]
@@ -161,15 +155,6 @@ def _offset(offset: Array | None) -> dict[str, Any]:
 
 def _degrees(radians: float) -> float:
     return round(float(np.degrees(radians)), 6)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Path):
-        return str(value.resolve())
-    if isinstance(value, tuple) and len(value) == 2 and isinstance(value[1], int):
-        host, port = value
-        return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-    return [str(network) for network in value] if isinstance(value, tuple) else value
 
 
 def _lines(actor: ActorConfig) -> str:

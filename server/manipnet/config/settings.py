@@ -1,16 +1,34 @@
-"""What a server is told before it starts: frozen values, checked here, whoever filled them in."""
+"""The configuration of a server: frozen values, and the options of which it is made."""
 
-import ipaddress
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
 
-from manipnet.geometry import Array
-from manipnet.net.addresses import Network
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.model.providers import DEFAULT_MODEL, Provider
+from manipnet import inputs, outputs
+from manipnet.common.options import (
+    Choice,
+    ConfigError,
+    Folder,
+    Network,
+    Networks,
+    Number,
+    Option,
+    Port,
+    Switch,
+    Text,
+    check_values,
+    from_keys,
+    option,
+    options_of,
+)
+from manipnet.net.addresses import is_loopback
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S, PROVIDERS, Provider
 from manipnet.synthesis.objects.library import library_file
+from manipnet.synthesis.objects.units import UNITS_M
+
+if TYPE_CHECKING:
+    from manipnet.geometry import Array
 
 BodyKey = int | str
 """Streaming id or name of a body, as its sender gives it."""
@@ -19,24 +37,31 @@ WRISTS: Final = ("left_wrist", "right_wrist")
 MAX_ACTORS: Final = 16
 MAX_OBJECTS: Final = 32
 SCALE_RANGE: Final = (0.2, 5.0)
-"""Sizes of a hand or a prop over their own that make sense."""
+"""Allowed scale factors of a hand."""
 
+SolverName = Literal["least_squares", "ccd", "none"]
+SOLVERS: Final = ("least_squares", "ccd", "none")
 
-class ConfigError(ValueError):
-    """Something the server is told makes no sense; the text names where, what, and what is allowed."""
+TRACKED: Final = "what is tracked"
+SYNTHESIS: Final = "how the fingers are synthesised"
+SERVER: Final = "where the server listens, and who may connect"
+FILES: Final = "files and log"
+"""Headings of the options in `--help`."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
 class BodyConfig:
-    """A streamed body and where on it the thing of interest sits: `offset (7,)` is T_body_thing, or None."""
+    """A tracked body, and where the wrist or prop sits on it: `offset (7,)` is the pose T_body_thing, or None."""
 
     key: BodyKey
-    offset: Array | None = None
+    offset: "Array | None" = None
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectConfig:
-    """A prop: the body that carries it, its mesh file, and the name clients know it by."""
+    """A prop: the body that carries it, its mesh file, and the name by which clients know it."""
 
     name: str
     body: BodyConfig
@@ -47,134 +72,149 @@ class ObjectConfig:
 
 @dataclass(frozen=True, slots=True)
 class ActorConfig:
-    """One pair of hands and the props they may take. `hand_scale` is the size of the hands over the model's."""
+    """One pair of hands and the props it may hold. `hand_scale` is the size of the hands relative to the model's."""
 
     name: str
     wrists: dict[str, BodyConfig]
-    """By `WRISTS`; one may be missing."""
+    """The bodies of one wrist or both, by the names in `WRISTS`."""
     objects: tuple[ObjectConfig, ...] = ()
     hand_scale: float = 1.0
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Lower and upper limit in radians of some angles of `skeleton.DOF_NAMES`, inside the model's own."""
+    """Lower and upper limit, in radians, of angles named in `skeleton.DOF_NAMES`; they narrow the model's limits."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServerConfig:
-    """Everything about one server."""
+    """The configuration of one server. `check` says whether a server can be started from it."""
 
     actors: tuple[ActorConfig, ...]
-    host: str = "127.0.0.1"
-    port: int = 5555
-    input_port: int = 5556
-    control_port: int = 5557
-    osc_port: int = 39540
-    page_port: int = 8080
-    web_port: int = 8081
-    metrics_port: int | None = None
-    natnet: tuple[str, int] | None = None
-    """Motive to connect to; the three below are about it."""
-    multicast: bool = False
-    interface: str | None = None
-    up: Literal["y", "z"] = "y"
-    vmc: tuple[str, int] | None = None
-    livelink: tuple[str, int] | None = None
-    model: str = DEFAULT_MODEL
-    provider: Provider = "auto"
-    look_ahead_s: float = MAX_LOOK_AHEAD_S
-    objects: Path | None = None
-    """Folder of the user's own object meshes."""
-    objects_unit: str = "m"
-    """Their unit."""
-    keys: Path | None = None
-    """Folder of the CURVE keys of `manipnet keys`."""
-    allow: tuple[Network, ...] = ()
-    """Networks that may send OSC; none given means any that reaches the port."""
-    insecure: bool = False
-    demo: bool = False
-    takes: Path = Path("takes")
-    """Folder of the recordings."""
-    dump_dir: Path | None = None
+    demo: bool = option(
+        False, Switch(), "play the bundled recording through the server's own sockets, over and over", group=TRACKED
+    )
+    objects: Path | None = option(
+        None,
+        Folder(),
+        "folder of your own meshes; clients can choose them, and changed files are reloaded",
+        group=TRACKED,
+    )
+    objects_unit: str = option("m", Choice(tuple(UNITS_M)), "unit of the meshes in that folder", group=TRACKED)
+    model: str = option(DEFAULT_MODEL, Text("NAME"), "name of a shipped model, or the folder of one", group=SYNTHESIS)
+    provider: Provider = option(
+        "auto", Choice(PROVIDERS), "what the network runs on; auto takes a GPU if one can be used", group=SYNTHESIS
+    )
+    solver: SolverName = option(
+        "least_squares", Choice(SOLVERS), "inverse kinematics that corrects the contacts", group=SYNTHESIS
+    )
+    look_ahead_s: float = option(
+        MAX_LOOK_AHEAD_S,
+        Number(0.0, MAX_LOOK_AHEAD_S, "seconds"),
+        "how much future motion to wait for; the rest of the half second that the model needs is forecast",
+        key="look_ahead",
+        group=SYNTHESIS,
+    )
+    host: str = option("127.0.0.1", Text("ADDRESS"), "address of this machine to listen on", group=SERVER)
+    control_port: int = option(5557, Port(), "TCP port for control requests (ZeroMQ REP)", group=SERVER)
+    page_port: int = option(8080, Port(), "TCP port of the live page (HTTP and WebSocket)", group=SERVER)
+    metrics_port: int | None = option(
+        None, Port(), "TCP port of metrics for Prometheus (HTTP); without it, there are none", group=SERVER
+    )
+    keys: Path | None = option(
+        None, Folder(), "let only clients with keys connect over ZeroMQ; `manipnet keys` makes the keys", group=SERVER
+    )
+    allow: tuple[Network, ...] = option(
+        (),
+        Networks(),
+        "network that may send OSC, or more frames over NatNet; repeatable",
+        group=SERVER,
+    )
+    insecure: bool = option(
+        False, Switch(), "let any machine connect if --host is not a loopback address", group=SERVER
+    )
+    takes: Path = option(Path("takes"), Folder(), "folder for recordings", group=FILES)
+    dump_dir: Path | None = option(
+        None,
+        Folder(),
+        "folder for the frames that led to an internal error; a folder of the user by default",
+        group=FILES,
+    )
+    protocols: tuple[Any, ...] = ()
+    """The options of inputs and outputs: one instance of each `Input.options` and `Output.options`, as far as they
+    differ from their defaults. `of` finds them."""
     rig: Path | None = None
-    """The file this came from, where calibrations are stored."""
+    """The rig file that this configuration came from, in which calibrations are stored."""
+
+    def of(self, options: type[T]) -> T:
+        """The options of one input or output, for example `config.of(OscOptions)`."""
+        return next((given for given in self.protocols if type(given) is options), None) or options()
+
+
+def protocol_options() -> tuple[type, ...]:
+    """The dataclasses in which inputs and outputs declare their options."""
+    return tuple(declared.options for declared in (*inputs.INPUTS, *outputs.OUTPUTS))
+
+
+def input_options() -> tuple[Option, ...]:
+    """The options of all inputs, for whatever else receives tracked bodies."""
+    return tuple(each for declared in inputs.INPUTS for each in options_of(declared.options))
+
+
+def all_options() -> dict[str, Option]:
+    """Every option of a server by its key, which is its name in a rig file's `[server]` table."""
+    return {each.key: each for declaring in (ServerConfig, *protocol_options()) for each in options_of(declaring)}
+
+
+def server_config(actors: tuple[ActorConfig, ...], values: Mapping[str, Any], rig: Path | None = None) -> ServerConfig:
+    """A configuration from the values of its options by key. The other options keep their defaults."""
+    protocols = tuple(from_keys(declaring, values) for declaring in protocol_options())
+    return from_keys(ServerConfig, values, actors=actors, protocols=protocols, rig=rig)
 
 
 def default_actor(objects: tuple[ObjectConfig, ...] = ()) -> ActorConfig:
-    """Who is expected when nobody says otherwise: bodies named like `WRISTS`."""
+    """The actor of a server without a rig file: its wrists are the bodies named like `WRISTS`."""
     return ActorConfig("actor", {wrist: BodyConfig(wrist) for wrist in WRISTS}, objects)
 
 
 def parse_object(text: str) -> ObjectConfig:
-    """`NAME=FILE`: the body NAME carries the mesh FILE, or one of the library by name. Raises `ConfigError`."""
+    """The prop of `NAME=FILE`: the body NAME carries the mesh FILE, or the mesh of that name in the library.
+
+    Raises `ConfigError`.
+    """
     name, equals, file = text.partition("=")
     if not (name and equals and file):
-        raise ConfigError(f"{text!r} is no NAME=FILE, for example Box=meshes/mug.obj or Box=mug")
+        raise ConfigError(f"{text!r} is not NAME=FILE, for example Box=meshes/mug.obj or Box=mug")
     mesh = Path(file) if Path(file).is_file() else library_file(file) or Path(file)
     return ObjectConfig(name, BodyConfig(int(name) if name.isdecimal() else name), mesh)
 
 
-def parse_endpoint(text: str, default_port: int) -> tuple[str, int]:
-    """`HOST` or `HOST:PORT`, an IPv6 address in brackets. Raises `ConfigError`."""
-    host, port = text, ""
-    if text.startswith("["):
-        host, _, port = text[1:].partition("]")
-        port = port.removeprefix(":")
-    elif text.count(":") == 1:
-        host, _, port = text.partition(":")
-    if not host or (port and not (port.isdecimal() and 0 < int(port) < 65536)):
-        raise ConfigError(f"{text!r} is no HOST[:PORT]; a port is 1 … 65535")
-    return host, int(port) if port else default_port
-
-
-def parse_network(text: str) -> Network:
-    """An address, or a network as `192.168.1.0/24`. Raises `ConfigError`."""
-    try:
-        return ipaddress.ip_network(text, strict=False)
-    except ValueError:
-        raise ConfigError(f"{text!r} is no address or network, for example 192.168.1.7 or 192.168.1.0/24") from None
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach `host`."""
-    try:
-        address = ipaddress.ip_address(host)
-        return (getattr(address, "ipv4_mapped", None) or address).is_loopback
-    except ValueError:
-        return host == "localhost"
-
-
 def check(config: ServerConfig) -> None:
-    """Raise `ConfigError` unless a server can be started from this."""
-    for option in ("port", "input_port", "control_port", "osc_port", "page_port", "web_port", "metrics_port"):
-        port = getattr(config, option)
-        if port is not None and not 0 <= port < 65536:
-            raise ConfigError(f"--{option.replace('_', '-')} is {port}; allowed are 0 (any free one) … 65535")
-    if not 0.0 <= config.look_ahead_s <= MAX_LOOK_AHEAD_S:
-        raise ConfigError(f"look_ahead is {config.look_ahead_s} s; allowed are 0 … {MAX_LOOK_AHEAD_S} s")
+    """Raise `ConfigError` unless a server can be started from `config`."""
+    for declared in (config, *config.protocols):
+        check_values(declared)
     if not (is_loopback(config.host) or config.insecure or (config.keys is not None and config.allow)):
         raise ConfigError(
-            f"--host {config.host} can be reached from other machines, and nothing would keep strangers out. "
-            "Give --keys FOLDER for ZeroMQ (`manipnet keys`) and --allow NETWORK for OSC; or stay on 127.0.0.1 and "
-            "tunnel (ssh -L); or add --insecure on a network you trust"
+            f"--host {config.host} can be reached from other machines, and nothing keeps strangers out. Give "
+            "--keys FOLDER for ZeroMQ (see `manipnet keys`) and --allow NETWORK for OSC; or stay on 127.0.0.1 and use "
+            "a tunnel (ssh -L); or add --insecure on a network that you trust"
         )
     _check_actors(config.actors)
 
 
 def _check_actors(actors: tuple[ActorConfig, ...]) -> None:
     if not 0 < len(actors) <= MAX_ACTORS:
-        raise ConfigError(f"{len(actors)} actors; allowed are 1 … {MAX_ACTORS}")
+        raise ConfigError(f"there are {len(actors)} actors; 1 … {MAX_ACTORS} are allowed")
     if twice := _repeated([actor.name for actor in actors]):
-        raise ConfigError(f"two actors are named {twice!r}; names tell them apart")
+        raise ConfigError(f"two actors are named {twice!r}; give one of them another name")
     for actor in actors:
         where = f"actor {actor.name!r}"
         if not actor.wrists:
-            raise ConfigError(f"{where} has no wrist; give at least one of {', '.join(WRISTS)}")
+            raise ConfigError(f"{where} has no wrist; it needs at least one of {', '.join(WRISTS)}")
         if len(actor.objects) > MAX_OBJECTS:
-            raise ConfigError(f"{where} has {len(actor.objects)} objects; allowed are {MAX_OBJECTS}")
+            raise ConfigError(f"{where} has {len(actor.objects)} objects; at most {MAX_OBJECTS} are allowed")
         if twice := _repeated([*WRISTS, *(thing.name for thing in actor.objects)]):
-            raise ConfigError(f"{where} has two things named {twice!r}; give the object another name")
+            raise ConfigError(f"{where} has two parts named {twice!r}; give the object another name")
         bodies = [*actor.wrists.values(), *(thing.body for thing in actor.objects)]
         if twice := _repeated([str(body.key) for body in bodies]):
-            raise ConfigError(f"{where} uses body {twice!r} twice; a body carries one thing")
+            raise ConfigError(f"{where} uses body {twice!r} twice; a body carries only one wrist or object")
 
 
 def _repeated(names: list[str]) -> str | None:

@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from manipnet.config.settings import ConfigError
+from manipnet.common.options import ConfigError
 
 Place = tuple[str | int, ...]
 """Keys from the top down; an entry of a list of tables by its index."""
@@ -40,7 +40,7 @@ def _parse_setting(setting: str) -> dict[str, Any]:
             return tomllib.loads(line)
         except (ValueError, RecursionError):
             continue
-    raise ConfigError(f"--set {setting}: is no KEY=VALUE as in a rig file, for example bodies.left_wrist=3")
+    raise ConfigError(f"--set {setting}: it is not KEY=VALUE with a key of a rig file, for example bodies.left_wrist=3")
 
 
 def _merged(old: Any, new: Any) -> Any:

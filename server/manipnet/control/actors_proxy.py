@@ -1,4 +1,4 @@
-"""The actors, for threads other than the one that owns them."""
+"""The actors, for threads other than the tick thread, which owns them."""
 
 from collections.abc import Callable, Sequence
 from typing import TypeVar
@@ -11,27 +11,26 @@ T = TypeVar("T")
 
 
 class ActorsProxy:
-    """The actors of a server as other threads may have them: between two ticks."""
+    """Lets other threads use the actors of a server between two ticks."""
 
     def __init__(self, actors: Sequence[Actor], mailbox: Mailbox) -> None:
         self.actors, self._mailbox = actors, mailbox
 
     def actor(self, request: Request) -> Actor:
-        """Whom a request is about, the first unless it says; raises `RequestError`."""
+        """The actor that is named in the request; the first by default. Raises `RequestError`."""
         names = tuple(actor.config.name for actor in self.actors)
         return self.actors[names.index(choice(request, "actor", names, default=names[0]))]
 
+    def named_or_all(self, request: Request) -> Sequence[Actor]:
+        """The actor that is named in the request; all actors by default. Raises `RequestError`."""
+        return self.actors if request.get("actor") is None else [self.actor(request)]
+
     def ask(self, question: Callable[[], T]) -> T:
-        """The answer of the tick thread; raises `RequestError` for a `ValueError`, and when there is none."""
+        """Run `question` on the tick thread and return its answer.
+
+        Raises `RequestError` for a `ValueError` of the question, and if the tick thread does not answer in time.
+        """
         try:
             return self._mailbox.ask(question)
         except (BusyError, ValueError) as error:
             raise RequestError(str(error)) from None
-
-
-def body_key(request: Request) -> int | str:
-    """The `body` of a request; raises `RequestError`."""
-    body = request.get("body")
-    if isinstance(body, bool) or not isinstance(body, int | str) or not 0 < len(str(body)) <= 128:
-        raise RequestError("body is missing or no name; give the streaming id or name of a body")
-    return body

@@ -1,5 +1,7 @@
-"""Requests about where things sit on their bodies: `calibrate` and `place_object`, in force at once, kept in the rig
-file. They look back at what was tracked, so nobody waits: hold still first, ask then."""
+"""The requests `calibrate` and `place_object`, which change where wrists and props sit on their bodies.
+
+The result is in force at once and is stored in the rig file.
+"""
 
 import time
 from collections.abc import Callable, Sequence
@@ -9,21 +11,21 @@ from typing import Any, Final
 import numpy as np
 
 from manipnet.actors import calibration
-from manipnet.actors.actor import SIDES, Actor
-from manipnet.actors.calibration import CalibrationError, Steady, steady_pose
-from manipnet.actors.transitions import HOLD_AFTER_S
+from manipnet.actors.actor import Actor
+from manipnet.actors.calibration import CalibrationError, Steady
+from manipnet.common.options import ConfigError
 from manipnet.config.rig_writer import store
-from manipnet.config.settings import WRISTS, ConfigError
-from manipnet.control.actors_proxy import ActorsProxy, body_key
-from manipnet.control.request import Handler, Request, RequestError, choice, number
+from manipnet.config.settings import WRISTS
+from manipnet.control.actors_proxy import ActorsProxy
+from manipnet.control.request import Handler, Request, RequestError, body_key, choice, flag, number, numbers
 from manipnet.control.session_requests import placement
+from manipnet.control.steady_bodies import SteadyBodies
 from manipnet.geometry import Array, compose, invert, quat_normalize
-from manipnet.synthesis.synthesizer import Side
+from manipnet.wire import SIDES, Side
 
 SECONDS: Final = 2.0
 SECONDS_RANGE: Final = (0.5, 4.0)
 STEPS: Final = ("wrists", "fingertips")
-NOT_STORED: Final = "the server was started without --rig FILE: this lasts until it stops"
 
 
 class CalibrationRequests:
@@ -32,7 +34,7 @@ class CalibrationRequests:
     def __init__(
         self, actors_proxy: ActorsProxy, rig: Path | None, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`rig` is the file the actors came from, if any; `clock` is the receivers'."""
+        """`rig` is the file from which the actors came, if any; `clock` is the receivers' clock."""
         self._proxy, self._rig, self._clock = actors_proxy, rig, clock
         self._backed_up = False
 
@@ -43,144 +45,139 @@ class CalibrationRequests:
     def _calibrate(self, request: Request) -> dict[str, Any]:
         actor = self._proxy.actor(request)
         step = choice(request, "step", STEPS, default=STEPS[0])
-        sides: list[Side] = [side for side in SIDES if side in actor.hands]
-        wanted = choice(request, "hand", ("both", *sides), default="both")
-        sides = [side for side in sides if wanted in ("both", side)]
-        reference = None if request.get("reference") is None else self._reference(actor, request)
-        scale = self._typed_scale(request, actor)
-        look = Look(self._proxy, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
+        sides = _sides(request, actor)
+        props = tuple(prop.name for prop in actor.props)
+        reference = None if request.get("reference") is None else choice(request, "reference", props)
+        scale = _requested_scale(request, actor)
+        bodies = self._steady_bodies(request, actor)
         try:
-            shown = look.at([*(f"{side}_wrist" for side in sides), *([reference] if reference else [])])
-            sheet = self._sheet(request, actor, reference, shown)
+            seen = bodies.measure([*(f"{side}_wrist" for side in sides), *([reference] if reference else [])])
+            sheet = _sheet(request, actor, reference, seen)
             if step == "wrists":
+                wrists: dict[str, Side] = {f"{side}_wrist": side for side in sides}
                 offsets = {
-                    f"{side}_wrist": calibration.calibrate_wrist(side, shown[f"{side}_wrist"], sheet, scale)
-                    for side in sides
+                    role: calibration.calibrate_wrist(side, seen[role], sheet, scale) for role, side in wrists.items()
                 }
             else:
-                scale, offsets = self._touched(actor, sides, shown, sheet)
+                scale, offsets = _touched(actor, sides, seen, sheet)
         except CalibrationError as error:
             raise RequestError(str(error)) from None
-        before = self._put(actor, offsets, scale)
-        steady = {part: shown[part] for part in offsets if part in shown}
+        before = self._apply(actor, offsets, scale)
+        measured = {role: seen[role] for role in offsets if role in seen}
         return {
             "actor": actor.config.name,
-            "quality": "good" if all(one.good for one in steady.values()) else "fair",
+            "quality": "good" if all(steady.good for steady in measured.values()) else "fair",
             "hand_scale": scale,
-            "hands": {part: _found(one, offsets[part], before[part]) for part, one in steady.items()},
-            **self._keep(actor, request),
+            "hands": {role: _report(steady, offsets[role], before[role]) for role, steady in measured.items()},
+            **self._store(actor, request),
         }
-
-    def _touched(
-        self, actor: Actor, sides: Sequence[Side], shown: dict[str, Steady], sheet: Array
-    ) -> tuple[float, dict[str, Array]]:
-        """Size of the hands whose fingertips touch the sheet's centre line, and the offsets it changes."""
-        lengths = []
-        for side in sides:
-            cluster = shown[f"{side}_wrist"]
-            wrist = compose(cluster.pose, actor.offset(f"{side}_wrist"))
-            lengths.append(calibration.measured_length(side, wrist, sheet))
-        scale = _scale_of(float(np.mean(lengths)))
-        before = actor.config.hand_scale
-        parts = [part for part in WRISTS if part in actor.config.wrists]
-        return scale, {part: calibration.scaled_offset(actor.offset(part), before, scale) for part in parts}
-
-    def _typed_scale(self, request: Request, actor: Actor) -> float:
-        if request.get("hand_length") is None:
-            return actor.config.hand_scale
-        return _scale_of(number(request, "hand_length", *calibration.HAND_LENGTH_RANGE_M))
-
-    def _reference(self, actor: Actor, request: Request) -> str:
-        names = tuple(prop.name for prop in actor.props)
-        return choice(request, "reference", names)
-
-    def _sheet(self, request: Request, actor: Actor, reference: str | None, shown: dict[str, Steady]) -> Array:
-        """Where the sheet lies: said, under a prop, or else at the world's origin."""
-        if reference is not None:
-            prop = next(prop for prop in actor.props if prop.name == reference)
-            T_world_object = compose(shown[reference].pose, actor.offset(reference))
-            lowest_m = calibration.lowest_point(prop.shape.mesh.vertices * prop.scale, T_world_object)
-            return calibration.sheet_under(T_world_object, lowest_m)
-        x, y, z, yaw = _numbers(request, "sheet", 4, (0.0, 0.0, 0.0, 0.0))
-        return calibration.sheet_at(np.array([x, y, z]), yaw)
 
     def _place_object(self, request: Request) -> dict[str, Any]:
         actor = self._proxy.actor(request)
         body = body_key(request)
-        part = self._proxy.ask(lambda: actor.part(body))
+        role = self._proxy.ask(lambda: actor.role(body))
         props = {prop.name: prop for prop in actor.props}
-        if part not in props:
-            allowed = ", ".join(props) or "none: select_object gives a body something to carry"
-            raise RequestError(f"body {body!r} carries nothing that could be placed; allowed are {allowed}")
-        if _flag(request, "on_sheet", False):
-            offset = self._on_sheet(request, actor, part, props[part].shape.bounds[0, 1] * props[part].scale)
+        if role not in props:
+            allowed = ", ".join(props) or "none yet: select_object lets a body carry one"
+            raise RequestError(f"body {body!r} does not carry an object; allowed are {allowed}")
+        if flag(request, "on_sheet", False):
+            offset = self._on_sheet(request, actor, role, props[role].shape.bounds[0, 1] * props[role].scale)
         else:
-            offset = np.concatenate([_numbers(request, "position", 3, (0.0, 0.0, 0.0)), _rotation(request)])
-        self._put(actor, {part: offset}, actor.config.hand_scale)
-        return {"actor": actor.config.name, "body": part, **placement(offset), **self._keep(actor, request)}
+            offset = np.concatenate([numbers(request, "position", (0.0, 0.0, 0.0)), _rotation(request)])
+        self._apply(actor, {role: offset}, actor.config.hand_scale)
+        return {"actor": actor.config.name, "body": role, **placement(offset), **self._store(actor, request)}
 
-    def _on_sheet(self, request: Request, actor: Actor, part: str, lowest_m: float) -> Array:
-        """Where an object sits on its body that stands upright in the middle of the sheet."""
-        look = Look(self._proxy, actor, self._clock(), number(request, "seconds", *SECONDS_RANGE, default=SECONDS))
+    def _steady_bodies(self, request: Request, actor: Actor) -> SteadyBodies:
+        seconds = number(request, "seconds", *SECONDS_RANGE, default=SECONDS)
+        return SteadyBodies(self._proxy, actor, self._clock(), seconds)
+
+    def _on_sheet(self, request: Request, actor: Actor, role: str, lowest_y_m: float) -> Array:
+        """The offset of an object that stands upright in the middle of the sheet; its mesh reaches to `lowest_y_m`."""
         try:
-            body = look.at([part])[part]
+            body = self._steady_bodies(request, actor).measure([role])[role]
         except CalibrationError as error:
             raise RequestError(str(error)) from None
-        sheet = self._sheet(request, actor, None, {})
-        return compose(invert(body.pose), calibration.upright_on_sheet(sheet, lowest_m))
+        sheet = _sheet(request, actor, None, {})
+        return compose(invert(body.pose), calibration.upright_on_sheet(sheet, lowest_y_m))
 
-    def _put(self, actor: Actor, offsets: dict[str, Array], scale: float) -> dict[str, Array]:
-        """Everything of one calibration between the same two ticks; returns the offsets there were."""
+    def _apply(self, actor: Actor, offsets: dict[str, Array], scale: float) -> dict[str, Array]:
+        """Change everything of one calibration between the same two ticks; returns the offsets from before."""
 
-        def put() -> dict[str, Array]:
-            before = {part: actor.offset(part) for part in offsets}
-            for part, offset in offsets.items():
-                actor.place(part, offset)
+        def apply() -> dict[str, Array]:
+            before = {role: actor.offset(role) for role in offsets}
+            for role, offset in offsets.items():
+                actor.place(role, offset)
             actor.resize_hands(scale)
             return before
 
-        return self._proxy.ask(put)
+        return self._proxy.ask(apply)
 
-    def _keep(self, actor: Actor, request: Request) -> dict[str, Any]:
-        """Write the rig file; what came of it, for the answer."""
-        if not _flag(request, "store", True):
-            return {"stored": None, "note": "as asked, the rig file stays as it is"}
+    def _store(self, actor: Actor, request: Request) -> dict[str, Any]:
+        """Write the rig file; returns the part of the answer that tells what became of it."""
+        if not flag(request, "store", True):
+            return {"stored": None, "note": "the rig file was not changed, as requested"}
         if self._rig is None:
-            return {"stored": None, "note": NOT_STORED}
+            return {
+                "stored": None,
+                "note": "in force until the server stops: it was started without --rig FILE",
+            }
         try:
             store(self._rig, actor.config, backup=not self._backed_up)
         except ConfigError as error:
             return {"stored": None, "note": f"in force, but not stored: {error}"}
         self._backed_up = True
-        return {"stored": str(self._rig), "note": f"what was there before is in {self._rig.name}.bak"}
+        return {"stored": str(self._rig), "note": f"the file from before is kept as {self._rig.name}.bak"}
 
 
-class Look:
-    """A look back at what was tracked of an actor."""
-
-    def __init__(self, actors_proxy: ActorsProxy, actor: Actor, now_s: float, seconds: float) -> None:
-        self._proxy, self._actor, self._now_s, self._seconds = actors_proxy, actor, now_s, seconds
-
-    def at(self, parts: Sequence[str]) -> dict[str, Steady]:
-        """Each part's body as it was held still. Raises `CalibrationError` and `RequestError`."""
-        seen = self._proxy.ask(lambda: [self._of(part) for part in parts])
-        return {
-            part: steady_pose(poses, part, rate_hz * self._seconds)
-            for part, (poses, rate_hz) in zip(parts, seen, strict=True)
-        }
-
-    def _of(self, part: str) -> tuple[Array, float]:
-        health = self._actor.health(self._now_s)[part]
-        if health.age_s > HOLD_AFTER_S:
-            raise ValueError(f"{part} is not tracked at present; see it in the tracking software (`manipnet doctor`)")
-        return self._actor.body_poses(part, self._seconds), health.rate_hz
+def _sides(request: Request, actor: Actor) -> list[Side]:
+    sides: list[Side] = [side for side in SIDES if side in actor.hands]
+    hand = choice(request, "hand", ("both", *sides), default="both")
+    return [side for side in sides if hand in ("both", side)]
 
 
-def _scale_of(length_m: float) -> float:
+def _requested_scale(request: Request, actor: Actor) -> float:
+    if request.get("hand_length") is None:
+        return actor.config.hand_scale
+    return _scale(number(request, "hand_length", *calibration.HAND_LENGTH_RANGE_M))
+
+
+def _sheet(request: Request, actor: Actor, reference: str | None, seen: dict[str, Steady]) -> Array:
+    """`T_world_sheet (7,)`: under the `reference` prop, or where the request says, by default at the world's origin."""
+    if reference is not None:
+        prop = next(prop for prop in actor.props if prop.name == reference)
+        T_world_object = compose(seen[reference].pose, actor.offset(reference))
+        lowest_m = calibration.lowest_point(prop.shape.mesh.vertices * prop.scale, T_world_object)
+        return calibration.sheet_under(T_world_object, lowest_m)
+    x, y, z, yaw = numbers(request, "sheet", (0.0, 0.0, 0.0, 0.0))
+    return calibration.sheet_at(np.array([x, y, z]), yaw)
+
+
+def _touched(
+    actor: Actor, sides: Sequence[Side], seen: dict[str, Steady], sheet: Array
+) -> tuple[float, dict[str, Array]]:
+    """The scale of hands whose fingertips touch the centre line of the sheet, and the wrist offsets that it changes."""
+    lengths_m = []
+    for side in sides:
+        wrist = compose(seen[f"{side}_wrist"].pose, actor.offset(f"{side}_wrist"))
+        lengths_m.append(calibration.measured_length(side, wrist, sheet))
+    scale, before = _scale(float(np.mean(lengths_m))), actor.config.hand_scale
+    wrists = [role for role in WRISTS if role in actor.config.wrists]
+    return scale, {role: calibration.scaled_offset(actor.offset(role), before, scale) for role in wrists}
+
+
+def _scale(length_m: float) -> float:
     return length_m / calibration.HAND_LENGTH_M
 
 
-def _found(steady: Steady, offset: Array, before: Array) -> dict[str, Any]:
+def _rotation(request: Request) -> Array:
+    rotation = numbers(request, "rotation", (0.0, 0.0, 0.0, 1.0))
+    try:
+        return quat_normalize(rotation)
+    except ValueError:
+        raise RequestError("rotation is zero; it must be a quaternion x, y, z, w") from None
+
+
+def _report(steady: Steady, offset: Array, before: Array) -> dict[str, Any]:
     changed_m, changed_rad = calibration.difference(before, offset)
     return {
         **placement(offset),
@@ -193,25 +190,3 @@ def _found(steady: Steady, offset: Array, before: Array) -> dict[str, Any]:
         "samples": steady.samples,
         "outliers": steady.outliers,
     }
-
-
-def _flag(request: Request, key: str, default: bool) -> bool:
-    value = request.get(key, default)
-    if not isinstance(value, bool):
-        raise RequestError(f"{key} is {str(value)[:60]}; it must be true or false")
-    return value
-
-
-def _numbers(request: Request, key: str, count: int, default: Sequence[float]) -> Array:
-    values = request.get(key, default)
-    if not isinstance(values, list | tuple) or len(values) != count:
-        raise RequestError(f"{key} is {str(values)[:60]}; it must be {count} numbers")
-    return np.array([number({key: value}, key, -100.0, 100.0) for value in values])
-
-
-def _rotation(request: Request) -> Array:
-    rotation = _numbers(request, "rotation", 4, (0.0, 0.0, 0.0, 1.0))
-    try:
-        return quat_normalize(rotation)
-    except ValueError:
-        raise RequestError("rotation is zero; it must be a quaternion x, y, z, w") from None

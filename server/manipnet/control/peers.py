@@ -1,4 +1,4 @@
-"""Who is around a server: senders, clients, Motive, and the clocks of them all, for `status` and for the metrics."""
+"""The connected senders and clients of a server, and their clocks, for the request `status` and for the metrics."""
 
 import threading
 import time
@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 from manipnet.control.request import Handler, Request, RequestError, number
-from manipnet.inputs.base import Sink
-from manipnet.inputs.natnet.client import STATES, NatNetBodies
+from manipnet.inputs.declaration import Receiver
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.telemetry import Gauge
 from manipnet.wire.bodies import MessageError, check_name
@@ -17,33 +16,31 @@ MAX_OFFSET_S: Final = 1e10
 
 
 class Peers:
-    """Knows the sockets of one server. Its `sink` is where the receivers leave frames. From any thread."""
+    """Reports who is connected to a server. From any thread."""
 
-    def __init__(self, sink: Sink) -> None:
-        self.sink = SenderStats(sink)
-        self.motive: NatNetBodies | None = None
+    def __init__(self, senders: SenderStats) -> None:
+        self._senders = senders
+        self.receivers: Mapping[str, Receiver] = {}
+        """The receivers by their names in `status`."""
         self.connected: Callable[[], Mapping[str, int]] = dict
-        """How many are connected at present, by socket."""
+        """The numbers of connected clients by the name of their socket."""
         self._lock = threading.Lock()
         self._clocks: dict[str, tuple[float, float, float]] = {}
 
     def handlers(self, status: Handler) -> dict[str, Handler]:
-        """`ping`, and `status` with what there is to say beside the answer of the given one."""
+        """The operations `ping` and `status`; the latter adds the peers to the answer of the given handler."""
         return {"ping": self._ping, "status": lambda request: {**status(request), **self._report()}}
 
     def gauges(self) -> Iterator[Gauge]:
         """What is measured at this moment."""
-        yield "connections", "socket", dict(self.connected())
-        if self.motive is None:
-            return
-        motive = self.motive.status()
-        yield "natnet_state", "state", {state: float(state == motive["state"]) for state in STATES}
-        for name in ("clock_offset", "clock_uncertainty", "capture_offset"):
-            value = motive[f"{name}_s"]
-            yield f"{name}_seconds", "clock", {} if value is None else {"natnet": value}
+        yield "connections", "socket", self._connections()
+
+    def _connections(self) -> dict[str, int]:
+        senders = {name: receiver.connected() for name, receiver in self.receivers.items()}
+        return {**self.connected(), **{name: count for name, count in senders.items() if count is not None}}
 
     def _ping(self, request: Request) -> dict[str, Any]:
-        """The server's monotonic clock; takes note of what who asks has found out about its own clock."""
+        """Answer with the server's monotonic clock; a client may tell how far its own clock is from it."""
         now_s = time.monotonic()
         if "name" in request:
             try:
@@ -61,20 +58,25 @@ class Peers:
 
     def _report(self) -> dict[str, Any]:
         now_s = time.monotonic()
-        report: dict[str, Any] = {"senders": self.sink.report(now_s), "connections": dict(self.connected())}
+        report: dict[str, Any] = {"senders": self._senders.report(now_s), "connections": self._connections()}
         with self._lock:
             report["clocks"] = {
                 name: {"clock_offset_s": offset_s, "clock_uncertainty_s": uncertainty_s, "age_s": now_s - at_s}
                 for name, (offset_s, uncertainty_s, at_s) in self._clocks.items()
             }
-        if self.motive is not None:
-            motive = report["natnet"] = self.motive.status()
-            if motive["capture_offset_s"] is not None:
-                measured = {
-                    "clock_offset_s": motive["capture_offset_s"],
-                    "clock_uncertainty_s": motive["clock_uncertainty_s"],
-                }
-                for source, sender in report["senders"].items():
-                    if source.startswith("natnet:"):
-                        sender |= measured
+        for name, receiver in self.receivers.items():
+            status = receiver.status()
+            if status is not None:
+                report[name] = status
+                _use_measured_clock(report["senders"], name, status)
         return report
+
+
+def _use_measured_clock(senders: Mapping[str, dict[str, Any]], protocol: str, status: Mapping[str, Any]) -> None:
+    """Prefer the clock offset that a receiver measures itself to the one that one-way traffic gives."""
+    if status.get("capture_offset_s") is None:
+        return
+    measured = {"clock_offset_s": status["capture_offset_s"], "clock_uncertainty_s": status["clock_uncertainty_s"]}
+    for source, sender in senders.items():
+        if source.startswith(f"{protocol}:"):
+            sender |= measured

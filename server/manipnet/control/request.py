@@ -1,37 +1,64 @@
-"""What a request is, how it is checked and refused."""
+"""What a request is, how its values are checked, and how it is refused."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from manipnet.geometry import Array
+
 Request = Mapping[str, Any]
-
-
 Handler = Callable[[Request], dict[str, Any]]
 
 
 class RequestError(ValueError):
-    """A request that cannot be met; the text says what was wrong and what is allowed."""
+    """A request that is refused; the text says what was wrong and what is allowed."""
 
 
 def number(request: Request, key: str, low: float, high: float, default: float | None = None) -> float:
-    """A number of the request within `low` … `high`; raises `RequestError`."""
+    """A number within `low` … `high`. Raises `RequestError`."""
     value = request.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise RequestError(f"{key} is {_show(value)}; it must be a number in {low} … {high}")
+        raise RequestError(f"{key} is {quoted(value)}; it must be a number in {low} … {high}")
     if not low <= value <= high:
         raise RequestError(f"{key} is {value}; allowed are {low} … {high}")
     return float(value)
 
 
-def choice(request: Request, key: str, allowed: tuple, default: Any = None) -> Any:
-    """One of the `allowed` values; raises `RequestError`, which lists them."""
+def numbers(request: Request, key: str, default: Sequence[float]) -> Array:
+    """As many numbers as in `default`, each within ±100. Raises `RequestError`."""
+    values = request.get(key, default)
+    if not isinstance(values, list | tuple) or len(values) != len(default):
+        raise RequestError(f"{key} is {quoted(values)}; it must be {len(default)} numbers")
+    return np.array([number({key: value}, key, -100.0, 100.0) for value in values])
+
+
+def flag(request: Request, key: str, default: bool) -> bool:
+    """A truth value. Raises `RequestError`."""
     value = request.get(key, default)
-    if isinstance(value, bool) or value not in allowed:
-        raise RequestError(f"{key} is {_show(value)}; allowed are {', '.join(map(str, allowed))}")
+    if not isinstance(value, bool):
+        raise RequestError(f"{key} is {quoted(value)}; allowed are true and false")
     return value
 
 
-def _show(value: Any) -> str:
+def choice(request: Request, key: str, allowed: tuple, default: Any = None) -> Any:
+    """One of the `allowed` values. Raises `RequestError`, which lists them."""
+    value = request.get(key, default)
+    if isinstance(value, bool) or value not in allowed:
+        raise RequestError(f"{key} is {quoted(value)}; allowed are {', '.join(map(str, allowed))}")
+    return value
+
+
+def body_key(request: Request) -> int | str:
+    """The streaming id or name of a body, from the key `body`. Raises `RequestError`."""
+    body = request.get("body")
+    if isinstance(body, bool) or not isinstance(body, int | str) or not 0 < len(str(body)) <= 128:
+        raise RequestError(f"body is {quoted(body)}; give the streaming id or the name of a body")
+    return body
+
+
+def quoted(value: Any) -> str:
+    """A value of a request for an error message, at most 60 characters."""
     text = "missing" if value is None else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}…"

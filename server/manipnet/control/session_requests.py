@@ -1,5 +1,4 @@
-"""What clients may ask of a running server. Handlers run on the control thread and touch the actors only through the
-mailbox, between two ticks."""
+"""The requests about a running server. Handlers run on the control thread and reach the actors through the mailbox."""
 
 import base64
 import time
@@ -10,37 +9,33 @@ from typing import Any, Final
 from manipnet import __version__
 from manipnet.actors.props import Prop
 from manipnet.config.settings import SCALE_RANGE
-from manipnet.control.actors_proxy import ActorsProxy, body_key
-from manipnet.control.request import Handler, Request, RequestError, choice, number
+from manipnet.control.actors_proxy import ActorsProxy
+from manipnet.control.request import Handler, Request, RequestError, body_key, choice, flag, number
 from manipnet.geometry import Array
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
 from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
 from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.objects.mesh import UNITS_M, MeshError
+from manipnet.synthesis.model.bundle import Bundle
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.objects.mesh import MeshError
+from manipnet.synthesis.objects.units import UNITS_M
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import TICK_HZ
+from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import VERSION
 
 MAX_PATH: Final = 1024
 
 
-class Requests:
-    """The operations of `docs/protocol.md`, Control."""
+class SessionRequests:
+    """Most operations of `docs/protocol.md`, Control."""
 
     def __init__(
-        self,
-        session: str,
-        model: str,
-        model_hash: str,
-        actors_proxy: ActorsProxy,
-        catalog: ObjectCatalog,
-        telemetry: Telemetry,
+        self, session: str, bundle: Bundle, actors_proxy: ActorsProxy, catalog: ObjectCatalog, telemetry: Telemetry
     ) -> None:
-        self._session, self._model, self._model_hash = session, model, model_hash
-        self._proxy, self._actors, self._catalog = actors_proxy, actors_proxy.actors, catalog
-        self._telemetry = telemetry
+        self._session, self._bundle = session, bundle
+        self._proxy, self._actors = actors_proxy, actors_proxy.actors
+        self._catalog, self._telemetry = catalog, telemetry
         self._started_s = time.monotonic()
 
     def handlers(self) -> Mapping[str, Handler]:
@@ -62,8 +57,8 @@ class Requests:
             "version": __version__,
             "schema": VERSION,
             "session": self._session,
-            "model": self._model,
-            "model_hash": self._model_hash,
+            "model": self._bundle.name,
+            "model_hash": self._bundle.model_hash,
             "tick_hz": TICK_HZ,
             "actors": [actor.config.name for actor in self._actors],
             "joint_names": list(JOINT_NAMES),
@@ -118,7 +113,7 @@ class Requests:
     def _add_object(self, request: Request) -> dict[str, Any]:
         file = request.get("file")
         if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH:
-            raise RequestError("file is missing or no text; give the path of a mesh on the server's machine")
+            raise RequestError("file is missing or is not a path; give the path of a mesh on the server's machine")
         try:
             shape = self._catalog.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))
         except MeshError as error:
@@ -130,32 +125,25 @@ class Requests:
 
         def change() -> None:
             for actor in self._actors:
-                actor.timeline.look_ahead_s = seconds
+                actor.look_ahead_s = seconds
 
         self._proxy.ask(change)
         return {"seconds": seconds}
 
     def _rest(self, request: Request) -> dict[str, Any]:
-        actors = self._actors if request.get("actor") is None else [self._proxy.actor(request)]
+        actors = self._proxy.named_or_all(request)
         self._proxy.ask(lambda: [actor.rest() for actor in actors])
         return {"actors": [actor.config.name for actor in actors]}
 
     def _pause(self, request: Request) -> dict[str, Any]:
-        on = request.get("on", True)
-        if not isinstance(on, bool):
-            raise RequestError(f"on is {on!r:.60}; allowed are true and false")
-        actors = self._actors if request.get("actor") is None else [self._proxy.actor(request)]
-
-        def change() -> None:
-            for actor in actors:
-                actor.paused = on
-
-        self._proxy.ask(change)
+        on = flag(request, "on", True)
+        actors = self._proxy.named_or_all(request)
+        self._proxy.ask(lambda: [actor.pause(on) for actor in actors])
         return {"actors": [actor.config.name for actor in actors], "paused": on}
 
 
 def placement(offset: Array) -> dict[str, list[float]]:
-    """Where something sits on its body, as a rig file says it."""
+    """An offset `(7,)` with the keys of a rig file."""
     return {"position": offset[:3].tolist(), "rotation": offset[3:].tolist()}
 
 

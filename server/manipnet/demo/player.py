@@ -6,7 +6,8 @@ import threading
 from pathlib import Path
 from typing import Final
 
-from manipnet.config.settings import BodyConfig, ConfigError, ObjectConfig
+from manipnet.common.options import ConfigError
+from manipnet.config.settings import BodyConfig, ObjectConfig
 from manipnet.inputs.playback import PlayError, ZmqBodySender, looped, play
 from manipnet.recording.mcap_file import RecordingError, read_bodies
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER

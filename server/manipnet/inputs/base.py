@@ -1,7 +1,7 @@
-"""What every receiver does with what it hears: count it, log faults at a limited rate, pass on the good."""
+"""What every receiver does with what arrives: count it, log what is wrong with it, and pass on the good frames."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from manipnet.telemetry import LogThrottle, Telemetry
 from manipnet.wire.bodies import BodyFrame
@@ -13,25 +13,29 @@ _log = logging.getLogger(__name__)
 
 
 class Intake:
-    """Delivers frames of one protocol to `sink`, which is called in the receiver's own thread."""
+    """Passes the frames of one protocol on to `sink`, on the receiver's own thread."""
 
-    def __init__(self, protocol: str, sink: Sink, telemetry: Telemetry) -> None:
+    def __init__(self, protocol: str, drop_reasons: Iterable[str], sink: Sink, telemetry: Telemetry) -> None:
         self.protocol = protocol
+        self.telemetry = telemetry
         self._sink = sink
-        self._telemetry = telemetry
         self._log_throttle = LogThrottle(LOG_PERIOD_S)
+        telemetry.declare("frames_in", protocol)
+        telemetry.declare("sender_restarts", protocol)
+        telemetry.declare("frames_dropped", *drop_reasons)
 
     def accept(self, frame: BodyFrame) -> None:
-        self._telemetry.count("frames_in", source=self.protocol)
+        """Count a frame and pass it on. A fault of the sink is logged and counted; it does not end the receiver."""
+        self.telemetry.count("frames_in", source=self.protocol)
         try:
             self._sink(frame)
-        except Exception:  # the receive thread outlives a bug behind it; the bug is counted and shown
-            self._telemetry.count("frames_dropped", reason="internal")
-            _log.exception("%s: a frame of %s was not digested", self.protocol, frame.source)
+        except Exception:
+            self.telemetry.count("frames_dropped", reason="internal")
+            _log.exception("%s: a frame of %s could not be taken in", self.protocol, frame.source)
 
     def drop(self, reason: str, source: str, text: object = "", n: int = 1) -> None:
-        """Count `n` lost frames and log one line of them per reason and period."""
-        self._telemetry.count("frames_dropped", n, reason=reason)
+        """Count `n` lost frames or messages, and log at most one line for each reason in a period."""
+        self.telemetry.count("frames_dropped", n, reason=reason)
         held_back = self._log_throttle.admit(reason, n)
         if held_back is not None:
             more = f" ({held_back} more since the last line)" if held_back else ""

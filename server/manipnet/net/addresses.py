@@ -1,14 +1,15 @@
-"""Networks, and who of them may send."""
+"""Addresses: which ones may send, and which ones only this machine can reach."""
 
 import ipaddress
 from collections.abc import Sequence
 
+from manipnet.common.options import Network
+
 MAX_ANSWERS = 256
-Network = ipaddress.IPv4Network | ipaddress.IPv6Network
 
 
 class AllowList:
-    """Whether an address is in one of the networks; remembers the latest answers. None allows all."""
+    """Says whether an address is in one of the networks; None allows every address. Remembers the latest answers."""
 
     def __init__(self, networks: Sequence[Network] | None) -> None:
         self._networks = networks
@@ -23,3 +24,12 @@ class AllowList:
             address = ipaddress.ip_address(host.partition("%")[0])
             self._answers[host] = any(address in network for network in self._networks)
         return self._answers[host]
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach `host`."""
+    try:
+        address = ipaddress.ip_address(host)
+        return (getattr(address, "ipv4_mapped", None) or address).is_loopback
+    except ValueError:
+        return host == "localhost"

@@ -10,7 +10,8 @@ import threading
 import time
 from collections.abc import Callable
 
-from manipnet.net.errors import ListenError
+from manipnet.common.options import ConfigError
+from manipnet.net.errors import ListenError, cannot_listen
 
 Address = tuple[str, int]
 Receive = Callable[[bytes, Address, float], None]
@@ -91,8 +92,8 @@ class UdpThread:
             self._drops = drops
 
 
-def bind_udp(what: str, host: str, port: int) -> socket.socket:
-    """A UDP socket on `host:port` (0: a free one) with a large receive buffer; raises `ListenError`."""
+def bind_udp(host: str, port: int) -> socket.socket:
+    """A UDP socket with a large receive buffer on `host:port`; port 0 takes any free port. Raises `ListenError`."""
     udp: socket.socket | None = None
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
@@ -101,11 +102,21 @@ def bind_udp(what: str, host: str, port: int) -> socket.socket:
     except (OSError, UnicodeError) as error:
         if udp is not None:
             udp.close()
-        raise ListenError(
-            f"cannot listen for {what} on {host}:{port}: {_reason(error)}; "
-            "choose a free port (0 takes any) and an address of this machine"
-        ) from None
+        raise cannot_listen(f"udp://{host}:{port}", _reason(error)) from None
     return udp
+
+
+def resolve(host: str, port: int) -> Address:
+    """The IPv4 address of `host`, for a sender that must not ask a name server at every datagram.
+
+    Raises `ConfigError`.
+    """
+    try:
+        found = socket.getaddrinfo(host, port, family=socket.AF_INET, type=socket.SOCK_DGRAM)
+        return str(found[0][4][0]), port
+    except (OSError, UnicodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ConfigError(f"{host!r} is not a known name or an IPv4 address ({reason})") from None
 
 
 def join_multicast(group: str, port: int, interface: str) -> socket.socket:

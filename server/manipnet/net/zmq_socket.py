@@ -1,22 +1,96 @@
-"""ZeroMQ sockets that hold up beside a live session: addresses, limits, binding."""
+"""ZeroMQ sockets with limits, so that neither a client nor a sender can hurt a live session."""
 
 import ipaddress
 import socket
 
 import zmq
 
-from manipnet.net.errors import ListenError
+from manipnet.common.options import Endpoint
+from manipnet.net.access_control import AccessControl
+from manipnet.net.curve_keys import ClientKeys, ServerKeys
+from manipnet.net.errors import ListenError, cannot_listen
+from manipnet.net.zap import secure_client
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import MAX_MESSAGE_BYTES
 
 HIGH_WATER_MARK = 64
+"""Messages that wait in a socket, half a second of hands. Beyond it, a client that does not read loses the newest."""
 MAX_WIRE_BYTES = 4 * MAX_MESSAGE_BYTES
-"""A message up to here is refused with a reason; a larger one costs its sender the connection."""
+"""A message of up to this size is refused with a reason; a larger one costs its sender the connection."""
 HEARTBEAT_MS = 1_000
 HEARTBEAT_TIMEOUT_MS = 3_000
 
 
+class BoundSocket:
+    """A socket that is bound to an address of this machine, in a context of its own, and who may connect to it.
+
+    With `keys`, connections are encrypted and only clients on the list of keys may connect.
+    """
+
+    def __init__(
+        self,
+        kind: zmq.SocketType,
+        host: str,
+        port: int,
+        telemetry: Telemetry,
+        keys: ServerKeys | None = None,
+        max_bytes: int = MAX_WIRE_BYTES,
+    ) -> None:
+        """Bind the socket, where port 0 takes any free port. Raises `ListenError` and `KeyFileError`.
+
+        A client that sends a message of more than `max_bytes` loses its connection.
+        """
+        endpoint, ipv6 = zmq_endpoint(host, port)
+        self._context = zmq.Context()
+        self._access: AccessControl | None = None
+        self.socket: zmq.Socket = self._context.socket(kind)
+        _limit(self.socket, max_bytes, ipv6)
+        try:
+            self._access = AccessControl(self._context, self.socket, telemetry, keys)
+            self.socket.bind(endpoint)
+        except BaseException as error:
+            self.close()
+            if isinstance(error, zmq.ZMQError):
+                raise cannot_listen(endpoint, zmq.strerror(error.errno or 0)) from None
+            raise
+        self.address: str = self.socket.getsockopt_string(zmq.LAST_ENDPOINT)
+
+    def connected(self) -> int:
+        """The number of connections. From any thread."""
+        return 0 if self._access is None else len(self._access.connections)
+
+    def delivered(self, frame: zmq.Frame) -> None:
+        """A whole message was read, of which `frame` is one part."""
+        if self._access is not None:
+            self._access.connections.delivered(frame.get(zmq.SRCFD))
+
+    def close(self) -> None:
+        """Close the socket and free the port. Belongs to the thread that uses the socket."""
+        self.socket.close()
+        self.interrupt()
+
+    def interrupt(self) -> None:
+        """Raise `zmq.ContextTerminated` in the thread that waits at the socket, and wait until it closes the socket."""
+        self._context.term()
+        if self._access is not None:
+            self._access.join()
+
+
+def connect(
+    context: zmq.Context, kind: zmq.SocketType, endpoint: Endpoint, keys: ClientKeys | None = None
+) -> zmq.Socket:
+    """A client's socket that connects to a socket of the server; `keys` are needed where the server asks for them."""
+    host, port = endpoint
+    client: zmq.Socket = context.socket(kind)
+    _limit(client, MAX_WIRE_BYTES, ipv6=":" in host)
+    if keys is not None:
+        secure_client(client, keys)
+    client.connect(f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
+    return client
+
+
 def zmq_endpoint(host: str, port: int) -> tuple[str, bool]:
-    """`tcp://…` for a numeric address or a host name, and whether it is IPv6; raises `ListenError`."""
+    """`tcp://…` for an address or the name of a machine, and whether it is IPv6. Raises `ListenError`."""
     try:
         address = ipaddress.ip_address(host)
     except ValueError:
@@ -28,23 +102,12 @@ def zmq_endpoint(host: str, port: int) -> tuple[str, bool]:
     return (f"tcp://[{address}]:{port}" if is_v6 else f"tcp://{address}:{port}"), is_v6
 
 
-def harden(receiver: zmq.Socket, ipv6: bool) -> None:
-    """Replace the defaults that hurt a live server: unbounded messages, no heartbeats, endless linger."""
-    receiver.setsockopt(zmq.LINGER, 0)
-    receiver.setsockopt(zmq.RCVHWM, HIGH_WATER_MARK)
-    receiver.setsockopt(zmq.MAXMSGSIZE, MAX_WIRE_BYTES)
-    receiver.setsockopt(zmq.HEARTBEAT_IVL, HEARTBEAT_MS)
-    receiver.setsockopt(zmq.HEARTBEAT_TIMEOUT, HEARTBEAT_TIMEOUT_MS)
-    receiver.setsockopt(zmq.IPV6, int(ipv6))
-
-
-def bind(sock: zmq.Socket, endpoint: str, option: str) -> None:
-    """Bind, or close the socket and raise `ListenError` naming the endpoint and the option that moves it."""
-    try:
-        sock.bind(endpoint)
-    except zmq.ZMQError as error:
-        sock.close()
-        raise ListenError(
-            f"{option}: cannot listen on {endpoint}: {zmq.strerror(error.errno or 0)}; "
-            f"is another server running? {option} 0 takes any free port"
-        ) from None
+def _limit(limited: zmq.Socket, max_bytes: int, ipv6: bool) -> None:
+    """Replace ZeroMQ's defaults: messages of any size, no heartbeats, and a close that waits without end."""
+    limited.setsockopt(zmq.LINGER, 0)
+    limited.setsockopt(zmq.SNDHWM, HIGH_WATER_MARK)
+    limited.setsockopt(zmq.RCVHWM, HIGH_WATER_MARK)
+    limited.setsockopt(zmq.MAXMSGSIZE, max_bytes)
+    limited.setsockopt(zmq.HEARTBEAT_IVL, HEARTBEAT_MS)
+    limited.setsockopt(zmq.HEARTBEAT_TIMEOUT, HEARTBEAT_TIMEOUT_MS)
+    limited.setsockopt(zmq.IPV6, int(ipv6))

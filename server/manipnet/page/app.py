@@ -2,7 +2,6 @@
 
 import logging
 import os
-import signal
 import socket
 import sys
 import threading
@@ -25,7 +24,6 @@ NICE: Final = 10
 
 def serve(listener: socket.socket, connection: Connection) -> None:
     """Serve the page until the server ends, however it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C stops the server, which then stops this process
     if hasattr(os, "nice"):
         os.nice(NICE)
     sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (viser prints there, but it is the server's)

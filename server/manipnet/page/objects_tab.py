@@ -12,7 +12,8 @@ from manipnet.geometry import Array, quat_exp, quat_log
 from manipnet.page.controls import Ask, Perform, by_visitor
 from manipnet.page.frames import Frame
 from manipnet.page.gizmo import Gizmo
-from manipnet.synthesis.objects.mesh import FORMATS, UNITS_M
+from manipnet.synthesis.objects.mesh import FORMATS
+from manipnet.synthesis.objects.units import UNITS_M
 
 NONES: Final[tuple[str, ...]] = ("none",)
 

@@ -6,7 +6,7 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from pathlib import Path
 
-from manipnet.actors.actor import ON_THE_BODY
+from manipnet.actors.body_roles import NO_OFFSET
 from manipnet.page.frames import Frame, PropView, ShapeView
 from manipnet.recording.mcap_file import About, RecordingError, read_about, read_hands
 from manipnet.synthesis.objects.library import library_names, load_library_mesh
@@ -44,7 +44,7 @@ def read_recording(path: Path) -> Recording:
     props, shapes = [], {}
     for name, (mesh, scale) in _meshes(read_about(path)).items():
         shapes[mesh.content_hash] = ShapeView(mesh.name, mesh.content_hash, mesh.vertices, mesh.faces)
-        props.append(PropView(name, mesh.name, mesh.content_hash, scale, ON_THE_BODY))
+        props.append(PropView(name, mesh.name, mesh.content_hash, scale, NO_OFFSET))
     return Recording(path.name, messages, tuple(props), shapes)
 
 

@@ -7,7 +7,6 @@ browser's own reconnecting starts another.
 
 import contextlib
 import logging
-import multiprocessing
 import selectors
 import socket
 import threading
@@ -16,16 +15,18 @@ from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, Final
 
-from manipnet.actors.actor import Actor, Plan
+from manipnet.actors.actor import Actor
+from manipnet.actors.plan import Plan
 from manipnet.actors.props import Prop
 from manipnet.geometry import Array
 from manipnet.net.errors import ListenError
 from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.page.serialization import pack, unpack
+from manipnet.runtime.child_process import ChildProcess
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandStep, Side
 from manipnet.telemetry import Telemetry
-from manipnet.tracking.timeline import Tick
+from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
 
 FRAMES_HZ: Final = 30.0
@@ -61,11 +62,9 @@ class LivePage:
         """Begin to serve."""
         self._thread.start()
 
-    def see(
-        self, actor: Actor, tick: Tick, plan: Plan | None, steps: Mapping[Side, HandStep], message: HandsMessage
-    ) -> None:
+    def see(self, actor: Actor, plan: Plan, message: HandsMessage) -> None:
         """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
-        frame = frame_of(actor, tick, steps, message)
+        frame = frame_of(actor, plan.tick, plan.steps, message)
         with self._news:
             if message.actor in self._newest:
                 self._telemetry.count("page_frames", fate="skipped")
@@ -106,25 +105,19 @@ class LivePage:
 
     def _serve(self) -> None:
         """One life of the page's process."""
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(target=_page, args=(self._listener, theirs), name="page", daemon=True)
-        process.start()
-        theirs.close()
+        child = ChildProcess("page", _page, self._listener)
+        ours = child.connection
         sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
         try:
             sender.start()
             self._listen_to(ours)
         finally:
             self.watched = False
-            ours.close()
+            child.close(STOP_S)
+            child.kill()
             with self._news:
                 self._newest.clear()
                 self._news.notify()
-            process.join(STOP_S)
-            if process.is_alive():
-                process.kill()
-                process.join()
             sender.join()
 
     def _listen_to(self, ours: Connection) -> None:
@@ -185,7 +178,7 @@ def _prop(prop: Prop, offset: Array) -> PropView:
     return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
 
 
-def _page(listener: socket.socket, connection: Connection) -> None:
+def _page(connection: Connection, listener: socket.socket) -> None:
     from manipnet.page.app import serve  # what it needs is of no use to the server itself
 
     serve(listener, connection)

@@ -16,7 +16,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from manipnet.config.settings import is_loopback
+from manipnet.net.addresses import is_loopback
 from manipnet.page import policy
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)

@@ -1,4 +1,4 @@
-"""Lines for the person at the terminal, written by a thread of its own: a stopped terminal must not stop the ticks."""
+"""Lines for the person at the terminal, from a thread of their own: a stopped terminal must not stop the ticks."""
 
 import contextlib
 import json
@@ -16,7 +16,7 @@ LOG_FORMAT: Final = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 
 
 class JsonFormatter(logging.Formatter):
-    """One JSON object a line: `time` (UTC), `level`, `logger`, `message`, and `event`, the message's constant part."""
+    """One JSON object per line: `time` (UTC), `level`, `logger`, `message`, and `event`, the message's template."""
 
     def format(self, record: logging.LogRecord) -> str:
         """The record as JSON text."""
@@ -33,26 +33,26 @@ class JsonFormatter(logging.Formatter):
 
 
 class Console(logging.Handler):
-    """Writes `say` to standard output and log records to standard error; drops lines nobody reads."""
+    """Writes `say` to standard output and log records to standard error; drops lines if nobody reads them."""
 
     def __init__(self, as_json: bool = False) -> None:
         super().__init__()
         self.setFormatter(JsonFormatter() if as_json else logging.Formatter(LOG_FORMAT))
         self.addFilter(RepeatFilter())
         self._lines: queue.Queue[tuple[str, bool] | None] = queue.Queue(WAITING_LINES)
-        self._thread = threading.Thread(target=self._write, name="terminal", daemon=True)
+        self._thread = threading.Thread(target=self._write, name="console", daemon=True)
         self._thread.start()
 
     def say(self, line: str) -> None:
-        """Show a line on standard output, soon."""
+        """Let the thread write a line to standard output."""
         self._put((line, False))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Show a log record on standard error, soon."""
+        """Let the thread write a log record to standard error."""
         self._put((self.format(record), True))
 
     def close(self) -> None:
-        """Write what waits, unless nobody reads, and stop."""
+        """Write the lines that wait, unless nobody reads them, and stop."""
         if self._thread.is_alive():
             self._put(None)
             self._thread.join(timeout=1.0)
@@ -67,5 +67,5 @@ class Console(logging.Handler):
             text, is_log = line
             try:
                 print(text, file=sys.stderr if is_log else sys.stdout, flush=True)
-            except (OSError, ValueError):  # the pipe's reader is gone; the hands are not for it
+            except (OSError, ValueError):  # the reader of the pipe is gone, but the server still serves its clients
                 return

@@ -1,4 +1,4 @@
-"""The last moments before an internal error, in a file: what came in, what was about to be computed."""
+"""The last moments before an internal error, in a file: what came in, and what was about to be computed."""
 
 import json
 import logging
@@ -11,20 +11,23 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from manipnet.tracking.timeline import Tick
+from manipnet.tracking.tick import Tick
 from manipnet.wire.bodies import BodyFrame
 
 KEEP_FRAMES: Final = 360
 """One to three seconds of input."""
 EVERY_S: Final = 60.0
 MAX_DUMPS: Final = 10
-"""Dumps of one session: an error that repeats 60 times a second must not fill the disk."""
+"""Files of one session: an error that repeats 60 times a second must not fill the disk."""
 
 _log = logging.getLogger(__name__)
 
 
 class FlightRecorder:
-    """Keeps the newest frames and writes them out when asked. Belongs to the tick thread, which waits for no disk."""
+    """Keeps the newest frames and writes them out after an error.
+
+    Belongs to the tick thread, which never waits for the disk.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -36,10 +39,10 @@ class FlightRecorder:
         """Remember a frame."""
         self._frames.append(frame)
 
-    def dump(self, error: BaseException, ticks: list[Tick], now_s: float) -> Path | None:
-        """Have frames, ticks and the error written as JSON; None when that was done moments ago.
+    def dump(self, error: BaseException, ticks: Sequence[Tick], now_s: float) -> Path | None:
+        """Let a thread write the frames, the ticks and the error as JSON. The end of the program waits for the thread.
 
-        A thread does it that the program's end waits for.
+        Returns the file's path, or None if a file was written less than `EVERY_S` ago or `MAX_DUMPS` are written.
         """
         if now_s - self._last_s < EVERY_S or self._count >= MAX_DUMPS:
             return None
@@ -53,7 +56,7 @@ class FlightRecorder:
         return path
 
     def finish(self) -> None:
-        """Wait until what was asked for last is written."""
+        """Wait until the newest file is written."""
         if self._writing is not None:
             self._writing.join()
 

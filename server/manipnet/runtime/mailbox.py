@@ -1,4 +1,4 @@
-"""Where receivers leave frames, and other threads requests, for the one thread that ticks."""
+"""Where receivers leave frames, and other threads their requests, for the thread that ticks."""
 
 import threading
 from collections import deque
@@ -10,18 +10,18 @@ from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
 
 MAX_FRAMES: Final = 512
-"""More than a second at 360 Hz; beyond it the oldest frames make room."""
+"""More than a second at 360 Hz. If more frames wait, the oldest are dropped."""
 MAX_REQUESTS: Final = 16
 
 T = TypeVar("T")
 
 
 class BusyError(RuntimeError):
-    """The tick thread has not answered in time, or has too much to answer."""
+    """The tick thread did not answer in time, or too many requests wait for it."""
 
 
 class Mailbox:
-    """Bounded, newest wins. `put` and `ask` from any thread; `wait` from the tick thread only."""
+    """A bounded queue that keeps the newest frames. Only the tick thread calls `wait`; any thread calls the others."""
 
     def __init__(self, telemetry: Telemetry) -> None:
         self._telemetry = telemetry
@@ -30,7 +30,7 @@ class Mailbox:
         self._requests: deque[tuple[Callable[[], object], Future]] = deque()
 
     def put(self, frame: BodyFrame) -> None:
-        """Leave a frame; never waits for the tick thread."""
+        """Leave a frame, without waiting for the tick thread."""
         with self._news:
             if len(self._frames) >= MAX_FRAMES:
                 self._frames.popleft()
@@ -39,9 +39,9 @@ class Mailbox:
             self._news.notify()
 
     def ask(self, question: Callable[[], T], timeout_s: float = 1.0) -> T:
-        """Run `question` on the tick thread, between two ticks, and return its answer or raise its error.
+        """Run `question` on the tick thread between two ticks; returns its answer or raises its error.
 
-        Raises `BusyError` when there is none in time.
+        Raises `BusyError` if there is no answer in time.
         """
         answer: Future = Future()
         with self._news:
@@ -56,7 +56,7 @@ class Mailbox:
             raise BusyError(f"the server did not answer within {timeout_s} s") from None
 
     def wait(self, timeout_s: float) -> list[BodyFrame]:
-        """All frames left so far; waits for the first news at most `timeout_s`. Answers requests on the way."""
+        """Take all frames, after a wait of at most `timeout_s` for something to arrive; answers the requests too."""
         with self._news:
             if not (self._frames or self._requests) and timeout_s > 0.0:
                 self._news.wait(timeout_s)
@@ -72,5 +72,5 @@ class Mailbox:
 def _answer(question: Callable[[], object], answer: Future) -> None:
     try:
         answer.set_result(question())
-    except Exception as error:  # whoever asked gets it; the ticks go on
+    except Exception as error:  # the caller of `ask` receives it, and the ticks go on
         answer.set_exception(error)

@@ -1,4 +1,4 @@
-"""Meshes whose files change while they are used."""
+"""Reloads meshes whose files change while they are in use."""
 
 import logging
 import threading
@@ -13,29 +13,29 @@ _log = logging.getLogger(__name__)
 
 
 class MeshWatch:
-    """Looks for changed mesh files on a thread of its own, and has their shapes swapped wherever they are used."""
+    """Checks the mesh files on a thread of its own, and lets `replace` swap the shapes of those that changed."""
 
-    def __init__(self, catalog: ObjectCatalog, swap: Callable[[Shape, Shape], None]) -> None:
-        """`swap` puts the second shape in the place of the first; if it raises, it is asked again."""
-        self._catalog, self._swap = catalog, swap
+    def __init__(self, catalog: ObjectCatalog, replace: Callable[[Shape, Shape], None]) -> None:
+        """`replace(old, new)` swaps a shape wherever it is in use; if it raises, it is called again later."""
+        self._catalog, self._replace = catalog, replace
         self._pending: list[tuple[Shape, Shape]] = []
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="mesh-watch", daemon=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Begin to check."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop looking; returns when it is done."""
+        """Stop checking; returns when the thread has ended."""
         self._stopping.set()
         self._thread.join()
 
     def look(self) -> None:
-        """Look once."""
+        """Check all files once."""
         self._pending += self._catalog.changed()
         while self._pending:
-            self._swap(*self._pending[0])
+            self._replace(*self._pending[0])
             self._pending.pop(0)
 
     def _run(self) -> None:
@@ -43,4 +43,6 @@ class MeshWatch:
             try:
                 self.look()
             except Exception as error:  # the watch outlives whatever happens to a file
-                _log.warning("the mesh watch stumbled, and goes on: %s: %s", type(error).__name__, error)
+                _log.warning(
+                    "mesh files could not be checked (%s: %s); the next check follows", type(error).__name__, error
+                )

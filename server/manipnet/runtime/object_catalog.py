@@ -1,13 +1,12 @@
-"""The shapes a server has or can get, by name, and the watch over their files."""
+"""The objects that a server knows or can load, by name: their shapes, each of which is built once."""
 
 import logging
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from manipnet.actors.props import Prop
-from manipnet.config.settings import ObjectConfig
 from manipnet.runtime.shape_process import make_shape
 from manipnet.synthesis.objects.library import library_file, library_names
 from manipnet.synthesis.objects.mesh import FORMATS, MeshError
@@ -27,14 +26,17 @@ class Source:
 
 
 class ObjectCatalog:
-    """Shapes of the rig, of the user's `folder` and of the library, each built once, on the thread that asks first.
+    """Shapes of the rig, of the user's `folder` and of the library. Thread-safe.
 
-    Of the same name, the rig's comes before the folder's, and that before the library's. Thread-safe.
+    A shape is built on the thread that first asks for it. If two objects have the same name, the rig's comes before the
+    folder's, and the folder's before the library's.
     """
 
-    def __init__(self, folder: Path | None = None, unit: str = "m") -> None:
-        """`unit` is that of the folder's files."""
-        self._folder, self._unit = folder, unit
+    def __init__(
+        self, folder: Path | None = None, unit: str = "m", build: Callable[[Path, str, float], Shape] = make_shape
+    ) -> None:
+        """`unit` is the unit of the folder's files; `build` makes a shape of a file, a unit and a scale."""
+        self._folder, self._unit, self._build_shape = folder, unit, build
         self._lock = threading.Lock()
         self._building = threading.Lock()
         self._sources: dict[str, Source] = {}
@@ -43,16 +45,16 @@ class ObjectCatalog:
         self._unsettled: dict[Source, tuple[int, int]] = {}
         self._problems: dict[str, str] = {}
 
-    def load(self, config: ObjectConfig) -> Prop:
-        """The prop of a rig's object. Raises `MeshError`."""
-        source = Source(config.mesh.resolve(), config.unit, config.scale)
+    def load(self, file: Path, unit: str = "m", scale: float = 1.0) -> Shape:
+        """The shape of a mesh file, which is an object from now on unless its name is taken. Raises `MeshError`."""
+        source = Source(file.resolve(), unit, scale)
         shape = self._built(source)
         with self._lock:
             self._sources.setdefault(shape.name, source)
-        return Prop(config.name, shape.name, shape)
+        return shape
 
     def add(self, file: Path, unit: str = "m") -> Shape:
-        """A mesh file more to choose from, in the place of one of the same name. Raises `MeshError`."""
+        """Add a mesh file; it replaces an object of the same name. Raises `MeshError`."""
         source = Source(file.resolve(), unit)
         with self._lock:
             self._shapes.pop(source, None)
@@ -62,13 +64,13 @@ class ObjectCatalog:
         return shape
 
     def names(self) -> tuple[str, ...]:
-        """What `shape` can be asked for."""
+        """The names of all objects, in order."""
         with self._lock:
-            own = tuple(self._sources)
-        return tuple(sorted({*own, *self._folder_files(), *library_names()}))
+            loaded = tuple(self._sources)
+        return tuple(sorted({*loaded, *self._folder_files(), *library_names()}))
 
     def shape(self, name: str) -> Shape:
-        """A shape by name, built on first use. Raises `MeshError`."""
+        """The shape of an object, which is built on first use. Raises `MeshError`."""
         with self._lock:
             source = self._sources.get(name)
         if source is None and (file := self._folder_files().get(name)) is not None:
@@ -76,25 +78,27 @@ class ObjectCatalog:
         if source is None and (file := library_file(name)) is not None:
             source = Source(file)
         if source is None:
-            raise MeshError(f"no object {name!r}; there are {', '.join(self.names())}")
+            raise MeshError(f"object {name!r} is unknown; allowed are {', '.join(self.names())}")
         return self._built(source)
 
     def shapes(self) -> tuple[Shape, ...]:
-        """Those built so far."""
+        """The shapes that are built so far."""
         with self._lock:
             return tuple(self._shapes.values())
 
     def problems(self) -> dict[str, str]:
-        """Files that changed into something that is no object, and why; the shapes from before stay."""
+        """By file name, why the newest content of a file cannot be used; the shape from before stays in use."""
         with self._lock:
             return dict(self._problems)
 
     def changed(self) -> list[tuple[Shape, Shape]]:
-        """Build anew what was built from a file that has changed since, and has not within the last two looks; the
-        old and the new shape of each."""
+        """Build the shapes of changed files again; returns the old and the new shape of each.
+
+        A file counts as changed when it has stayed the same since the last call, so that nobody is still writing it.
+        """
         with self._lock:
             sources = tuple(self._shapes)
-        pairs = [(self._shapes[source], self._built_anew(source)) for source in sources if self._has_settled(source)]
+        pairs = [(self._shapes[source], self._rebuilt(source)) for source in sources if self._has_settled(source)]
         return [(old, new) for old, new in pairs if new is not None and new.content_hash != old.content_hash]
 
     def _folder_files(self) -> dict[str, Path]:
@@ -107,7 +111,7 @@ class ObjectCatalog:
         return {path.stem: path for path in paths if path.suffix.lower() in FORMATS}
 
     def _has_settled(self, source: Source) -> bool:
-        """Whether a file differs from what was built, and is as it was at the last look: nobody is writing it."""
+        """Whether a file differs from what was built and has not changed since the last look."""
         stamp = _stamp(source.path)
         before = self._unsettled.pop(source, None)
         if stamp is None or stamp == self._stamps.get(source):
@@ -117,17 +121,17 @@ class ObjectCatalog:
         return stamp == before
 
     def _built(self, source: Source) -> Shape:
-        with self._building:  # one at a time; whoever only wants what is there does not wait
+        with self._building:  # one shape at a time; a caller that needs no new shape does not wait for it
             with self._lock:
                 shape = self._shapes.get(source)
             return shape or self._build(source)
 
-    def _built_anew(self, source: Source) -> Shape | None:
+    def _rebuilt(self, source: Source) -> Shape | None:
         try:
             with self._building:
                 shape = self._build(source)
         except MeshError as error:
-            _log.warning("a mesh file has changed, but is not used: %s", error)
+            _log.warning("a mesh file has changed, but its new content cannot be used: %s", error)
             with self._lock:
                 self._problems[source.path.name] = str(error)
             return None
@@ -136,7 +140,7 @@ class ObjectCatalog:
 
     def _build(self, source: Source) -> Shape:
         self._stamps[source] = _stamp(source.path) or (0, 0)
-        shape = make_shape(source.path, source.unit, source.scale)
+        shape = self._build_shape(source.path, source.unit, source.scale)
         _ = shape.rays  # a tick must not be the first to ask for them
         with self._lock:
             self._shapes[source] = shape
@@ -145,7 +149,7 @@ class ObjectCatalog:
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
-    """What changes with a file's content; None while there is none."""
+    """Numbers that change with a file's content; None if there is no file."""
     try:
         stat = path.stat()
     except OSError:

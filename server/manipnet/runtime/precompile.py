@@ -1,20 +1,22 @@
-"""The first start of an installation, when nothing is compiled yet: a second process compiles what hands sense with,
-what builds shapes and some smaller kernels, while the first one imports and compiles inverse kinematics.
+"""Compiles the sensing kernels in a child process at the first start of an installation.
 
-Run as a module it is that second process; what it compiled it leaves in the cache.
+The child also compiles what builds shapes and some smaller kernels, while the server imports its libraries and compiles
+inverse kinematics. The server then finds the child's work in the cache.
 """
 
-import subprocess
-import sys
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Final
 
 from manipnet.jit import cached
+from manipnet.runtime.child_process import ChildProcess
 
-SENSING = "_all_but_readings"
-"""The kernel of `network.features` that takes longest to compile."""
+SENSING: Final = "_all_but_readings"
+"""The kernel of `synthesis.model.features` that takes longest to compile."""
 
 
 def compile_aside() -> None:
-    """Compile all kernels of a start and of a tick but the solver's, by using each once as they do."""
+    """Compile all kernels of a start and of a tick except the solver's, by a use of each."""
     import numpy as np
 
     from manipnet.synthesis.hand.limits import keep_angles
@@ -40,28 +42,27 @@ def compile_aside() -> None:
 
 
 class Precompiler:
-    """The second process, if one is needed."""
+    """Runs the child process if anything is missing in the cache."""
 
     def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
+        self._child: ChildProcess | None = None
 
     @property
     def idle(self) -> bool:
-        """Whether none was needed so far."""
-        return self._process is None
+        """Whether no child process was needed."""
+        return self._child is None
 
     def start(self) -> None:
-        """Let it begin, unless everything is in the cache."""
+        """Begin to compile, unless everything is in the cache."""
         if not cached(SENSING):
-            quiet = subprocess.DEVNULL
-            command = [sys.executable, "-m", "manipnet.runtime.precompile"]
-            self._process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+            self._child = ChildProcess("precompile", _compile)
 
     def wait(self) -> None:
-        """Until it is done. Where it failed, whoever needs a kernel compiles it."""
-        if self._process is not None:
-            self._process.wait()
+        """Wait for the end of the child. If it failed, the server compiles what it needs itself."""
+        if self._child is not None:
+            self._child.close()
 
 
-if __name__ == "__main__":
-    compile_aside()
+def _compile(_: Connection) -> None:
+    with suppress(Exception):  # the server meets the same error and reports it
+        compile_aside()

@@ -1,23 +1,25 @@
-"""Prometheus metrics over HTTP, from a thread of its own."""
+"""Prometheus metrics over HTTP, from a thread of their own."""
 
 from collections.abc import Iterator
+from typing import Final
 
 from prometheus_client import CollectorRegistry, start_http_server
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 
 from manipnet.net.errors import ListenError
-from manipnet.telemetry import LABELS, STAGES, Telemetry
+from manipnet.telemetry import STAGES, Telemetry
 
-QUANTILES = (50.0, 99.0, 99.9, 100.0)
+QUANTILES: Final = (50.0, 99.0, 99.9, 100.0)
 
 
 class MetricsPage:
-    """Serves `http://host:port/metrics`; raises `ListenError` when it cannot."""
+    """Serves the telemetry of a session at `http://host:port/metrics`."""
 
     def __init__(self, host: str, port: int, telemetry: Telemetry) -> None:
+        """Raises `ListenError`."""
         registry = CollectorRegistry()
-        registry.register(_Figures(telemetry))
+        registry.register(_TelemetryCollector(telemetry))
         try:
             self._server, self._thread = start_http_server(port, host, registry)
         except OSError as error:
@@ -33,27 +35,27 @@ class MetricsPage:
         self._thread.join()
 
 
-class _Figures(Collector):
+class _TelemetryCollector(Collector):
     def __init__(self, telemetry: Telemetry) -> None:
         self._telemetry = telemetry
 
     def collect(self) -> Iterator[Metric]:
-        counted = self._telemetry.counts()
-        for name, (label, values) in LABELS.items():
+        """Every counter, with zeros for labels that were not counted yet, the stage durations and the gauges."""
+        counts = self._telemetry.counts()
+        for name, (label, values) in self._telemetry.labels().items():
             family = CounterMetricFamily(f"manipnet_{name}", name.replace("_", " "), labels=[label])
             for value in values:
-                family.add_metric([value], counted.get(name, {}).get(value, 0))
+                family.add_metric([value], counts.get(name, {}).get(value, 0))
             yield family
         yield self._stages()
-        for name, label, values in self._telemetry.gauges():
+        for name, label, levels in self._telemetry.gauges():
             gauge = GaugeMetricFamily(f"manipnet_{name}", name.replace("_", " "), labels=[label])
-            for value, level in values.items():
+            for value, level in levels.items():
                 gauge.add_metric([value], level)
             yield gauge
 
     def _stages(self) -> Metric:
-        name = "manipnet_stage_seconds"
-        timings = self._telemetry.timings
+        name, timings = "manipnet_stage_seconds", self._telemetry.timings
         family = Metric(name, "time spent per tick", "summary")
         for stage in STAGES:
             count, sum_s = timings.totals(stage)

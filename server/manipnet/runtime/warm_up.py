@@ -1,9 +1,10 @@
-"""Run everything once before a client waits for it: compiled code, the network's memory, the first allocations."""
+"""Runs everything once before a client waits for it: compiled code, the network's memory, the first allocations."""
 
 import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from manipnet.config.settings import default_actor
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
-from manipnet.synthesis.ik.pose import allocate_poses, pose_by_least_squares
+from manipnet.synthesis.ik.pose import POSERS, SolverName, allocate_poses
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.layout import INPUT_SIZE
 from manipnet.synthesis.objects.library import load_library_mesh
@@ -23,16 +24,14 @@ from manipnet.telemetry import Telemetry
 from manipnet.wire import encode_binary, encode_msgpack
 from manipnet.wire.bodies import BodyFrame, BodySample
 
-FRAMES = 120
-"""Two hands at a prop for one second: about thirty ticks."""
+FRAMES: Final = 120
+"""Frames of one second, in which two hands at a prop make about thirty ticks."""
+LOOK_AHEAD_S: Final = 0.4
+"""Less than the window needs, so that something has to be forecast."""
 
 
-LOOK_AHEAD_S = 0.4
-"""So that there is something to forecast."""
-
-
-def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
-    """Show each shape to two hands for half a second, in a loop like the real one that nobody listens to."""
+def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: SolverName = "least_squares") -> None:
+    """Synthesise two hands at each shape for half a second, in a loop like the real one whose messages go nowhere."""
     for shape in shapes:
         telemetry = Telemetry()
         mailbox = Mailbox(telemetry)
@@ -41,7 +40,7 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
         loop = TickLoop(
             "warm-up",
             [actor],
-            Synthesizer(bundle, on_stage=telemetry.stages.ended),
+            Synthesizer(bundle, solver, telemetry.stages.ended),
             lambda message: (encode_msgpack(message), encode_binary(message)),
             mailbox,
             FlightRecorder(Path(tempfile.gettempdir())),
@@ -56,14 +55,14 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape]) -> None:
                 pass
 
 
-def pose_a_hand(bundle: Bundle) -> None:
-    """Decode and solve: the kernel that this process compiles at a first start, while another compiles the rest."""
+def pose_a_hand(bundle: Bundle, solver: SolverName = "least_squares") -> None:
+    """Decode and solve one pose: at a first start this process compiles the solver, while another compiles the rest."""
     shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
     outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]
     poses = allocate_poses(1)
     poses.correction[:] = 0.0
-    pose_by_least_squares(shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
+    POSERS[solver](shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

@@ -1,4 +1,4 @@
-"""The little of Blender that the extension uses, just working enough to run it. `timers` run when the test says so."""
+"""The parts of Blender that the extension uses, complete enough to run it. The test decides when `timers` run."""
 
 import re
 from types import SimpleNamespace
@@ -9,7 +9,7 @@ from mathutils import Matrix
 
 
 class Named(dict):
-    """A collection that can be asked by name and iterates over its members, as Blender's do."""
+    """A collection that is indexed by name and iterates over its members, as Blender's collections do."""
 
     def __iter__(self):
         return iter(self.values())
@@ -52,7 +52,7 @@ class Curves(dict):
 
 
 class SlottedAction:
-    """An action as of Blender 4.4: curves in a bag, for a slot, in a strip, in a layer."""
+    """An action since Blender 4.4: its curves are in a channel bag of a slot, in a strip of a layer."""
 
     def __init__(self, name):
         self.name, self.curves = name, Curves()
@@ -84,7 +84,7 @@ class Timers:
         return function in self.registered
 
     def run(self):
-        """One round; a function that returns None is done."""
+        """Call every function once; one that returns None is removed."""
         self.registered = [function for function in self.registered if function() is not None]
 
 

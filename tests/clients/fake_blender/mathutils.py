@@ -1,4 +1,4 @@
-"""The few types of Blender's mathutils that the extension uses."""
+"""The types of Blender's mathutils that the extension uses."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,11 +9,11 @@ class Vector(tuple):
 
 
 class Quaternion(tuple):
-    """w, x, y, z."""
+    """A quaternion in the order w, x, y, z."""
 
 
 class Matrix:
-    """4x4."""
+    """A 4x4 matrix."""
 
     def __init__(self, rows):
         self.rows = np.array(rows.rows if isinstance(rows, Matrix) else rows, float)

@@ -1,4 +1,4 @@
-"""A folder of takes: all that can be done is done, once, wherever it is done."""
+"""`manipnet batch`: every good take gets one result, on this machine or on a cluster."""
 
 import json
 import multiprocessing
@@ -21,7 +21,7 @@ from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
 from manipnet_tools.batch.command import find_takes, take_names
 from manipnet_tools.batch.job import Job
-from manipnet_tools.batch.local import run_here
+from manipnet_tools.batch.local import run_locally
 
 CUBE = LIBRARY_FOLDER / "cube.ply"
 
@@ -41,7 +41,7 @@ def record(path: Path, seconds: float = 1.3, prop: str = "Box") -> Path:
 
 @pytest.fixture
 def takes(tmp_path: Path) -> Path:
-    """Two good takes, three bad ones, and a text that is none."""
+    """Two good takes, three bad ones, and a text that is not a take."""
     folder = tmp_path / "takes"
     for name in ("a", "day2/b"):
         record(folder / f"{name}.mcap")
@@ -62,16 +62,16 @@ def summary(out: Path) -> dict[str, dict]:
 
 
 def check_results(out: Path) -> None:
-    said = summary(out)
-    states = {name: take["state"] for name, take in said.items()}
+    takes = summary(out)
+    states = {name: take["state"] for name, take in takes.items()}
     assert states == {"a": "done", "day2_b": "done", "short": "failed", "other": "failed", "broken": "failed"}
-    assert "more than 1 s" in said["short"]["reason"]
-    assert said["other"]["reason"] == "no --mesh: at least one of Hat needs one"
-    assert said["broken"]["reason"].startswith("is no CSV export of Motive")
+    assert "more than 1 s" in takes["short"]["reason"]
+    assert takes["other"]["reason"] == "no --mesh: at least one of the take's objects needs a mesh (Hat)"
+    assert takes["broken"]["reason"].startswith("is not a CSV export of Motive")
     assert sorted(path.name for path in out.glob("*.npz")) == ["a.npz", "day2_b.npz"]
     assert not list(out.glob("*.part"))
     with np.load(out / "a.npz") as file:
-        assert len(file["time"]) == said["a"]["frames"] > 10
+        assert len(file["time"]) == takes["a"]["frames"] > 10
         assert file["left_positions"].shape[1:] == (22, 3)
 
 
@@ -81,9 +81,9 @@ def test_a_failed_take_does_not_stop_the_others(
     out = tmp_path / "out"
     assert batch(takes, out, tiny_bundle, "--jobs", "2") == 1
     check_results(out)
-    said = capsys.readouterr().err
-    assert "3 of 5 takes failed" in said
-    assert "times real time" in " ".join(said.split())
+    printed = capsys.readouterr().err
+    assert "3 of 5 takes failed" in printed
+    assert "times real time" in printed
     stamps = {path.name: path.stat().st_mtime_ns for path in out.glob("*.npz")}
 
     for name in ("short.mcap", "other.mcap", "broken.csv"):
@@ -103,7 +103,7 @@ def test_a_failed_take_does_not_stop_the_others(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
-def test_a_process_that_dies_costs_one_take(takes: Path, tmp_path: Path, tiny_bundle: Path) -> None:
+def test_when_a_process_dies_only_its_take_fails(takes: Path, tmp_path: Path, tiny_bundle: Path) -> None:
     jobs = [
         Job(name, takes / file, {"Box": CUBE}, tiny_bundle, 0.5, None, tmp_path / f"{name}.npz")
         for name, file in (("first", "a.mcap"), ("second", "day2/b.mcap"))
@@ -117,14 +117,14 @@ def test_a_process_that_dies_costs_one_take(takes: Path, tmp_path: Path, tiny_bu
             assert process.pid is not None
             os.kill(process.pid, signal.SIGKILL)
 
-    outcomes = list(run_here(jobs, 1, kill_once))
+    outcomes = list(run_locally(jobs, 1, kill_once))
     by_name = {outcome.name: outcome for outcome in outcomes}
     assert by_name["second"].state == "done"
     assert by_name["first"].state in ("failed", "done")
     assert not multiprocessing.active_children()
 
 
-def test_takes_are_found_at_any_depth_and_named_apart(tmp_path: Path) -> None:
+def test_takes_are_found_at_any_depth_and_get_different_names(tmp_path: Path) -> None:
     for name in ("one/leftHand.bvh", "one/rightHand.bvh", "walk.csv", "walk.mcap", "day/walk.csv", "notes.txt", "a.md"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text("x")
@@ -143,32 +143,32 @@ def test_takes_are_found_at_any_depth_and_named_apart(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        ({"--jobs": "0"}, "--jobs is 0; allowed are 1 and more"),
-        ({"--look-ahead": "2"}, "--look-ahead is 2.0 s; allowed are 0 to 0.5"),
+        ({"--jobs": "0"}, "--jobs is 0; it must be at least 1"),
+        ({"--look-ahead": "2"}, "--look-ahead is 2 s; allowed are 0 to 0.5"),
         ({"--mesh": "cube"}, "--mesh cube: must be NAME=FILE"),
         ({"--mesh": "Box=gone.obj"}, "gone.obj"),
         ({"--model": "gone"}, "model 'gone' is no folder and no shipped bundle"),
     ],
 )
-def test_what_no_take_could_be_done_with_is_said_first(
+def test_options_that_no_take_could_use_are_refused_before_any_work(
     takes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], change: dict[str, str], complaint: str
 ) -> None:
     options = {"--out": str(tmp_path / "out")} | change
     assert cli.main(["batch", str(takes), *(word for pair in options.items() for word in pair)]) == 1
-    assert complaint in " ".join(capsys.readouterr().err.split())
+    assert complaint in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_without_takes_says_what_a_take_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_without_takes_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["batch", str(tmp_path), "--out", str(tmp_path / "out")]) == 1
-    assert "holds no take; a take is a folder of BVH files" in capsys.readouterr().err
+    assert "no take found; a take is a folder of BVH files" in capsys.readouterr().err
     assert cli.main(["batch", str(tmp_path / "x.csv"), "--out", str(tmp_path / "out")]) == 1
-    assert "is no folder" in capsys.readouterr().err
+    assert "is not a folder" in capsys.readouterr().err
 
 
 @pytest.fixture
 def two_workers(tmp_path: Path) -> Iterator[str]:
-    """A Ray cluster of somebody else's on this machine, with two workers; its address."""
+    """The address of a Ray cluster on this machine that another process started, with two workers."""
     pytest.importorskip("ray", reason="Ray is not installed: python -m pip install 'manipnet-live[cluster]'")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -181,20 +181,20 @@ def two_workers(tmp_path: Path) -> Iterator[str]:
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
     ) as head:
         assert head.stdout is not None
-        said = []
-        while not any("Ray runtime started" in line for line in said):
+        lines = []
+        while not any("Ray runtime started" in line for line in lines):
             line = head.stdout.readline()
-            assert line, said
-            said.append(line)
+            assert line, lines
+            lines.append(line)
         yield f"127.0.0.1:{port}"
-        assert head.poll() is None, "a cluster of somebody else's was shut down"
+        assert head.poll() is None, "the batch shut down a cluster that it had not started"
         head.terminate()
         head.stdout.read()
         head.wait(PATIENCE_S)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Ray's command does not run on Windows")
-def test_a_cluster_does_the_same(
+def test_a_cluster_gives_the_same_results(
     takes: Path, tmp_path: Path, tiny_bundle: Path, two_workers: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, here = tmp_path / "out", tmp_path / "here"
@@ -205,10 +205,10 @@ def test_a_cluster_does_the_same(
         assert all(np.array_equal(ours[key], theirs[key]) for key in theirs.files)
     assert batch(takes, here, tiny_bundle, "--ray", two_workers) == 1
     states = {take["state"] for name, take in summary(here).items() if name in ("a", "day2_b")}
-    assert states == {"skipped"}, "what was done without a cluster is not done again on one"
+    assert states == {"skipped"}, "results that were made without a cluster are up to date for one"
 
 
-def test_no_cluster_is_said_with_the_remedy(
+def test_without_ray_the_error_says_how_to_install_it(
     takes: Path, tmp_path: Path, tiny_bundle: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)

@@ -1,8 +1,8 @@
-"""`manipnet calibrate`: what it asks a server for, and what it tells of the answer."""
+"""`manipnet calibrate`: the request that it sends, and what it prints."""
 
 import pytest
 
-from manipnet.config.settings import ConfigError
+from manipnet.common.options import ConfigError
 from manipnet_tools.commands import calibrate
 from manipnet_tools.commands.calibrate import CalibrateOptions, report, request
 
@@ -24,7 +24,7 @@ def test_the_options_become_one_request() -> None:
     assert "sheet" not in asked
 
 
-def test_the_answer_is_told_with_its_quality() -> None:
+def test_the_answer_is_printed_with_its_quality() -> None:
     hand = {
         "spread_mm": 0.61,
         "spread_deg": 0.2,
@@ -35,17 +35,24 @@ def test_the_answer_is_told_with_its_quality() -> None:
     }
     answer = {"quality": "good", "hand_scale": 0.868, "hands": {"left_wrist": hand}, "stored": None, "note": "lasts"}
     lines = report(answer)
-    assert lines[0] == "good: hands 0.868 times the model's"
-    assert "left_wrist: still within 0.6 mm and 0.20° (240 samples, 2 left out); changed by 31.2 mm" in lines[1]
+    assert lines[0] == "good: the hands are 0.868 times the size of the model's"
+    assert lines[1] == (
+        "left_wrist: held still within 0.6 mm and 0.20° (240 samples, 2 outliers ignored); "
+        "the calibration changed by 31.2 mm and 84.0°"
+    )
     assert lines[2] == "lasts"
-    assert "kept in rig.toml" in report(answer | {"stored": "rig.toml"})[2]
+    assert "saved in rig.toml" in report(answer | {"stored": "rig.toml"})[2]
 
 
 @pytest.mark.parametrize(
     ("server", "complaint"),
-    [("127.0.0.1:5557", "give it as tcp://HOST:5557"), ("tcp://127.0.0.1:1", "no server answers at tcp://127.0.0.1:1")],
+    [
+        ("127.0.0.1:1", "no server answers at tcp://127.0.0.1:1 .* start it with"),
+        ("tcp://127.0.0.1:1", "no server answers at tcp://127.0.0.1:1 .* start it with"),
+        ("127.0.0.1:many", "a port of 1 … 65535"),
+    ],
 )
-def test_without_a_server_the_remedy_is_told(server: str, complaint: str, monkeypatch) -> None:
+def test_without_a_server_the_remedy_is_printed(server: str, complaint: str, monkeypatch) -> None:
     monkeypatch.setattr(calibrate, "ANSWER_S", 0.05)
     with pytest.raises(ConfigError, match=complaint):
         calibrate.run(CalibrateOptions(server=server))

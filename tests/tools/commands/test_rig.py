@@ -9,16 +9,16 @@ import pytest
 import zmq
 
 from manipnet import cli as server_cli
+from manipnet.common.options import ConfigError
 from manipnet.config.rig_reader import load_rig
-from manipnet.config.settings import ConfigError
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
-from manipnet_tools.commands.rig_guess import Listener, guess, rig_of
+from manipnet_tools.commands.rig_guess import BodyCollector, guess, rig_of
 
 
 def heard(*bodies: tuple[int | None, str | None, float]):
     """Bodies by id, name, and the speed they go to and fro with for three seconds, within the noise of a tracker."""
-    listener, rng = Listener(), np.random.default_rng(3)
+    listener, rng = BodyCollector(), np.random.default_rng(3)
     for i in range(360):
         samples = tuple(
             BodySample(id, name, (speed * abs((i / 120) % 1.0 - 0.5), *rng.normal(0.0, 5e-4, 2)), (0, 0, 0, 1), True)
@@ -51,14 +51,15 @@ def test_wrists_without_names_are_those_that_were_waved_the_right_one_more() -> 
     assert "swapped" in found.wrists["left_wrist"][1]
 
 
-def test_what_is_said_is_not_guessed() -> None:
+def test_what_is_given_is_not_guessed() -> None:
     found = guess(heard((1, None, 0.9), (2, None, 0.6)), {"left_wrist": 1})
     assert {part: key for part, (key, _) in found.wrists.items()} == {"left_wrist": 1, "right_wrist": 2}
 
 
-def test_when_nothing_tells_the_wrists_the_remedy_is_told() -> None:
+def test_when_nothing_tells_the_wrists_the_remedy_is_named() -> None:
     with pytest.raises(
-        ConfigError, match=r"heard: Box, 2\); wave both hands while it listens, the right one more, or say"
+        ConfigError,
+        match=r"arrived: Box, 2\); wave both hands while this command listens, the right hand more",
     ):
         guess(heard((None, "Box", 0.0), (2, None, 0.0)), {})
 
@@ -71,7 +72,7 @@ def test_the_rig_is_one_and_strange_bodies_stay_as_comments(tmp_path: Path) -> N
     (tmp_path / "rig.toml").write_text(rig_of(found, {"natnet": "10.0.0.2"}), encoding="utf-8")
     rig = load_rig(tmp_path / "rig.toml")
     assert [(thing.body.key, thing.mesh.stem) for thing in rig.actors[0].objects] == [("Mug 2", "mug"), ("Box", "cube")]
-    assert rig.server == {"natnet": "10.0.0.2"}
+    assert rig.server == {"natnet": ("10.0.0.2", 1510)}
     assert '# body = "My \\"Head\\""' in (tmp_path / "rig.toml").read_text(encoding="utf-8")
 
 
@@ -128,11 +129,11 @@ def test_init_listens_and_writes_and_replaces_only_when_told(tmp_path: Path, cap
     }
     before = path.read_text(encoding="utf-8")
     assert cli.main(command) == 1
-    assert "is there already; --force replaces it" in capsys.readouterr().err
+    assert "already exists; --force replaces it" in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == before
     wrists = ["--left-wrist", "Anna", "--right-wrist", "4", "--seconds", "0.01", "--force"]
     assert cli.main([*command, *wrists]) == 0
-    assert "what was there is in" in capsys.readouterr().out
+    assert "the file it replaces is now" in capsys.readouterr().out
     assert (tmp_path / "rig.toml.bak").read_text(encoding="utf-8") == before
     assert load_rig(path).actors[0].wrists["left_wrist"].key == "Anna"
 

@@ -33,5 +33,5 @@ def test_the_file_holds_both_hands_in_the_world_at_sixty_hertz(still_model, mani
         np.testing.assert_allclose(aligned, 1.0, atol=1e-6)
     with pytest.raises(TakeError, match=r"look-ahead 0\.7 s is outside 0 to 0\.5"):
         run(replace(options, look_ahead=0.7))
-    with pytest.raises(TakeError, match=r"--mesh spoon=x\.obj: must be NAME=FILE with NAME one of mug1"):
+    with pytest.raises(TakeError, match=r"--mesh spoon=x\.obj: no object is called 'spoon'; the objects are mug1"):
         read_shapes(("spoon=x.obj",), take, options.take)

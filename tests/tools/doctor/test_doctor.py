@@ -14,8 +14,8 @@ from manipnet.net.curve_keys import make_client_keys, make_server_keys, read_ser
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.doctor import command as doctor
-from manipnet_tools.doctor import other_interfaces as elsewhere
-from manipnet_tools.doctor.diagnosis import Heard, SourceHeard, diagnose
+from manipnet_tools.doctor import other_interfaces
+from manipnet_tools.doctor.diagnosis import SourceTraffic, Traffic, diagnose
 from manipnet_tools.doctor.from_status import of_server
 
 PARTS = {"left_wrist": "left_wrist", "right_wrist": 2}
@@ -23,7 +23,7 @@ PARTS = {"left_wrist": "left_wrist", "right_wrist": 2}
 
 def stream(*bodies, rate_hz=120.0, seconds=2.0, clock=1.0, source="osc:a"):
     """What one sender sent: bodies as `(id, name, tracked)`."""
-    heard = SourceHeard()
+    heard = SourceTraffic()
     samples = tuple(BodySample(id, name, (0, 1, 0), (0, 0, 0, 1), tracked) for id, name, tracked in bodies)
     for n in range(round(rate_hz * seconds)):
         heard.add(BodyFrame(clock * n / rate_hz, n, samples, n / rate_hz, source))
@@ -34,7 +34,7 @@ GOOD = stream((1, "left_wrist", True), (2, "R", True))
 
 
 def problems(sources, dropped=None, complaints=(), parts=PARTS):
-    findings = diagnose(Heard(sources, dropped or {}, complaints), parts, {"osc": "udp://127.0.0.1:39540"})
+    findings = diagnose(Traffic(sources, dropped or {}, complaints), parts, ["udp://127.0.0.1:39540"])
     assert all(finding.remedy for finding in findings if finding.level == "problem")
     return [f"{f.text} → {f.remedy}" for f in findings if f.level == "problem"]
 
@@ -46,26 +46,30 @@ def test_a_good_stream_has_no_problem():
 @pytest.mark.parametrize(
     ("sources", "dropped", "says"),
     [
-        ({}, {}, ["nothing arrives at all → is the sender running and sending to udp://127.0.0.1:39540"]),
-        ({}, {"malformed": 9}, ["9 dropped as malformed", "packets arrive, but none that is understood"]),
-        (GOOD, {"kernel": 3}, ["3 dropped as kernel → too much traffic"]),
+        ({}, {}, ["nothing arrives at all → is the sender running, and does it send to udp://127.0.0.1:39540"]),
+        (
+            {},
+            {"malformed": 9},
+            ["9 messages were dropped as malformed", "packets arrive, but none of them"],
+        ),
+        (GOOD, {"kernel": 3}, ["3 messages were dropped as kernel → there is too much traffic"]),
         (
             stream((2, None, True)),
             {},
-            ["left_wrist: no body 'left_wrist' arrives → give it that name", "let the rig name one of: 2"],
+            ["left_wrist: no body 'left_wrist' arrives → give the body that name", "name one of these in the rig: 2"],
         ),
         (stream((1, "left_wrist", True), (2, None, False)), {}, ["right_wrist: body 2 arrives but is never tracked"]),
-        (stream((1, "left_wrist", True), (2, None, True), rate_hz=10), {}, ["10 frames a second → send 30 to 360"]),
+        (stream((1, "left_wrist", True), (2, None, True), rate_hz=10), {}, ["10 frames per second → send 30 to 360"]),
         (
             stream((1, "left_wrist", True), (2, None, True), clock=1e-3),
             {},
-            ["0.001 s in one second of ours → ZeroMQ's t"],
+            ["time stamps advance by 0.001 s per second → send t in seconds"],
         ),
-        (stream((1, "left_wrist", True), (2, None, True), clock=0), {}, ["its clock makes 0 s"]),
+        (stream((1, "left_wrist", True), (2, None, True), clock=0), {}, ["its time stamps advance by 0 s"]),
         (
             {**GOOD, **stream((2, None, True), source="zmq:b")},
             {},
-            ["comes from 2 senders: osc:a, zmq:b → stop all but one"],
+            ["comes from 2 senders: osc:a, zmq:b → stop all senders of this body but one"],
         ),
     ],
 )
@@ -109,7 +113,7 @@ def test_a_port_in_use(ports, capsys):
         other.bind(("127.0.0.1", port(ports, "--osc-port")))
         assert doctor.main([*ports, "--seconds=0.1"]) == 1
     said = capsys.readouterr().out
-    assert "cannot listen for OSC" in said
+    assert "cannot listen on udp://" in said
     assert "ss -lntup" in said
 
 
@@ -127,7 +131,7 @@ def test_a_wrong_interface(ports, capsys, options, says):
 
 
 def test_packets_for_another_address_of_this_machine(ports, capsys, monkeypatch):
-    monkeypatch.setattr(elsewhere, "own_addresses", lambda: {"127.0.0.1", "127.0.0.2"})
+    monkeypatch.setattr(other_interfaces, "own_addresses", lambda: {"127.0.0.1", "127.0.0.2"})
     osc, bodies = (port(ports, name) for name in ("--osc-port", "--input-port"))
 
     def send(seconds):
@@ -138,7 +142,7 @@ def test_packets_for_another_address_of_this_machine(ports, capsys, monkeypatch)
     monkeypatch.setattr(doctor, "listen", send)
     assert doctor.main([*ports]) == 1
     said = capsys.readouterr().out
-    assert f"3 packets or connections came to 127.0.0.2:{osc}, but the server is to listen on 127.0.0.1" in said
+    assert f"3 packets or connections came to 127.0.0.2:{osc}, but the server listens on 127.0.0.1" in said
     assert f"1 packets or connections came to 127.0.0.2:{bodies}" in said
     assert "start the server with --host 127.0.0.2" in said
 
@@ -204,10 +208,14 @@ def test_motive_that_does_not_answer(ports, capsys):
     ("counters", "bodies", "says"),
     [
         ({}, {}, "nothing arrives at all"),
-        ({"frames_in": {"osc": 5}, "frames_dropped": {"unknown_body": 5}}, {}, "5 frames hold no body the rig knows"),
+        (
+            {"frames_in": {"osc": 5}, "frames_dropped": {"unknown_body": 5}},
+            {},
+            "5 frames contain no body that the rig",
+        ),
         ({"frames_in": {"osc": 5}}, {"Box": {"state": "rest", "age_s": 9}}, "actor: Box is not tracked at present"),
         ({"frames_in": {"osc": 5}}, {"Box": {"state": "rest", "age_s": None}}, "actor: Box has never been tracked"),
-        ({"frames_in": {"osc": 5}, "frames_dropped": {"kernel": 7}}, {}, "7 dropped as kernel"),
+        ({"frames_in": {"osc": 5}, "frames_dropped": {"kernel": 7}}, {}, "7 messages were dropped as kernel"),
         ({"frames_in": {"osc": 5}}, {"Box": {"state": "live"}}, "frames that arrived: 5 by osc"),
     ],
 )
@@ -233,9 +241,9 @@ def test_a_running_server_is_asked(ports, capsys, monkeypatch, counters, bodies,
     [
         ("connecting", None, "Motive does not answer"),
         ("connected", None, "answers but streams no frames"),
-        ("silent", None, "has fallen silent"),
+        ("silent", None, "has stopped sending"),
         ("connected", "it speaks Klingon", "NatNet: it speaks Klingon"),
-        ("streaming", None, "Motive, NatNet 3.0 answers; rigid bodies it defines: 1 'Box'"),
+        ("streaming", None, "Motive, NatNet 3.0 answers; it defines the rigid bodies 1 'Box'"),
     ],
 )
 def test_a_running_server_tells_of_motive(state, problem, says):

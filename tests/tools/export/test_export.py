@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from npm import run_node
 
-from manipnet.actors.actor import ShownHand
 from manipnet.actors.hands_message import hand_poses
-from manipnet.actors.transitions import Shown
+from manipnet.actors.transitions import ShownHand
 from manipnet.geometry import compose, mirror_points, quat_conjugate, quat_exp, quat_log, quat_multiply, transform
 from manipnet.recording.mcap_file import RecordingWriter, mesh_file
 from manipnet.synthesis.hand.kinematics import forward_kinematics
@@ -21,7 +20,7 @@ from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.synthesizer import hand_to_world
 from manipnet.wire import BodyPose, HandsMessage
 from manipnet_tools import cli
-from manipnet_tools.export.animation import Animation, ExportError, HandTrack, hand_track, read_performance
+from manipnet_tools.export.animation import Animation, ExportError, HandTrack, hand_track, read_animation
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf
@@ -49,7 +48,7 @@ def angles() -> dict[str, np.ndarray]:
 
 
 @pytest.fixture(scope="module")
-def performance(angles: dict[str, np.ndarray]) -> Animation:
+def animation(angles: dict[str, np.ndarray]) -> Animation:
     """Two hands and two props, of which one has a mesh."""
     rng = np.random.default_rng(4)
     hands = {}
@@ -67,22 +66,22 @@ def turned_rad(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.linalg.norm(quat_log(quat_multiply(quat_conjugate(a), b)), axis=-1).max())
 
 
-def test_bvh_comes_back_as_it_was(performance: Animation, tmp_path: Path) -> None:
-    write_bvh(performance, tmp_path / "take")
+def test_bvh_comes_back_as_it_was(animation: Animation, tmp_path: Path) -> None:
+    write_bvh(animation, tmp_path / "take")
     take = read_take(tmp_path / "take")
     assert (take.rate_hz, take.objects) == (60.0, ("Box", "the_cup"))
     for side in SIDES:
-        positions, rotations = performance.hands[side].world()
+        positions, rotations = animation.hands[side].world()
         assert turned_rad(take.fingers[side].rotations, rotations) < 1e-4
         assert np.allclose(take.fingers[side].positions, positions, atol=1e-6)
-    assert turned_rad(take.bodies["the_cup"].poses[:, 3:], performance.objects["the cup"].poses[:, 3:]) < 1e-4
+    assert turned_rad(take.bodies["the_cup"].poses[:, 3:], animation.objects["the cup"].poses[:, 3:]) < 1e-4
     with pytest.raises(ExportError, match="holds BVH files already"):
-        write_bvh(performance, tmp_path / "take")
+        write_bvh(animation, tmp_path / "take")
 
 
 def test_a_captured_take_comes_back_as_it_was(manipnet_data: Path, tmp_path: Path) -> None:
     source = manipnet_data / "BVH" / "mug1"
-    write_bvh(read_performance(source), tmp_path / "take")
+    write_bvh(read_animation(source), tmp_path / "take")
     before, after = read_take(source), read_take(tmp_path / "take")
     assert (after.rate_hz, after.objects) == (before.rate_hz, before.objects)
     for side in SIDES:
@@ -94,17 +93,15 @@ def test_a_captured_take_comes_back_as_it_was(manipnet_data: Path, tmp_path: Pat
     assert [word for word in ours.split() if word.isupper()] == [word for word in theirs.split() if word.isupper()]
 
 
-def test_bvh_for_others_is_right_handed_centimetres(performance: Animation, tmp_path: Path) -> None:
-    write_bvh(performance, tmp_path / "blender", right_handed=True)
+def test_bvh_for_others_is_right_handed_centimetres(animation: Animation, tmp_path: Path) -> None:
+    write_bvh(animation, tmp_path / "blender", right_handed=True)
     for side in SIDES:
         bvh = read_bvh(tmp_path / "blender" / f"{side}Hand.bvh")
         translations, rotations = bvh.local_transforms()
         world = [np.concatenate([translations[:, 0], rotations[:, 0]], axis=1)]
         for j, joint in enumerate(bvh.joints[1:], start=1):
             world.append(compose(world[joint.parent], np.concatenate([translations[:, j], rotations[:, j]], axis=1)))
-        assert np.allclose(
-            np.stack(world, axis=1)[..., :3], 100 * performance.hands[side].world()[0][:, :17], atol=1e-3
-        )
+        assert np.allclose(np.stack(world, axis=1)[..., :3], 100 * animation.hands[side].world()[0][:, :17], atol=1e-3)
 
 
 class Gltf:
@@ -157,24 +154,24 @@ class Gltf:
 
 
 @pytest.mark.parametrize("frame", [0, 17, FRAMES - 1])
-def test_gltf_skins_the_hands_as_we_do(performance: Animation, angles, tmp_path: Path, frame: int) -> None:
-    write_gltf(performance, tmp_path / "juggle.glb")
+def test_gltf_skins_the_hands_as_we_do(animation: Animation, angles, tmp_path: Path, frame: int) -> None:
+    write_gltf(animation, tmp_path / "juggle.glb")
     gltf = Gltf(tmp_path / "juggle.glb")
     for side in SIDES:
         vertices = skin(*forward_kinematics(angles[side][frame]))
         vertices = mirror_points(vertices) if side == "left" else vertices
         assert np.allclose(
-            gltf.skinned(f"{side}_hand", frame), transform(performance.hands[side].wrist[frame], vertices), atol=2e-6
+            gltf.skinned(f"{side}_hand", frame), transform(animation.hands[side].wrist[frame], vertices), atol=2e-6
         )
     names = [node["name"] for node in gltf.json["nodes"]]
-    for name, body in performance.objects.items():
+    for name, body in animation.objects.items():
         assert np.allclose(gltf.poses(frame)[names.index(name)][:3], body.poses[frame, :3], atol=1e-6)
     tips = gltf.poses(frame)[names.index("right_INDEX_TIP")][:3]
-    assert np.allclose(tips, performance.hands["right"].world()[0][frame, JOINT_NAMES.index("INDEX_TIP")], atol=1e-6)
+    assert np.allclose(tips, animation.hands["right"].world()[0][frame, JOINT_NAMES.index("INDEX_TIP")], atol=1e-6)
 
 
-def test_gltf_faces_look_outward_and_time_starts_at_zero(performance: Animation, tmp_path: Path) -> None:
-    write_gltf(performance, tmp_path / "juggle.glb")
+def test_gltf_faces_look_outward_and_time_starts_at_zero(animation: Animation, tmp_path: Path) -> None:
+    write_gltf(animation, tmp_path / "juggle.glb")
     gltf = Gltf(tmp_path / "juggle.glb")
     for mesh in gltf.json["meshes"]:
         primitive = mesh["primitives"][0]
@@ -196,9 +193,9 @@ validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])), {uri: 
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])
-def test_the_khronos_validator_has_nothing_to_say(performance: Animation, tmp_path: Path, suffix: str) -> None:
+def test_the_khronos_validator_has_nothing_to_say(animation: Animation, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"juggle{suffix}"
-    write_gltf(performance, path)
+    write_gltf(animation, path)
     report = run_node(VALIDATE, str(path), packages=("gltf-validator@2.0.0-dev.3.10",))
     issues = report["issues"]
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"]
@@ -206,16 +203,16 @@ def test_the_khronos_validator_has_nothing_to_say(performance: Animation, tmp_pa
     assert report["info"]["animationCount"] == 1
 
 
-def test_a_stranger_reads_the_file(performance: Animation, tmp_path: Path) -> None:
+def test_a_stranger_reads_the_file(animation: Animation, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
-    write_gltf(performance, tmp_path / "juggle.glb")
+    write_gltf(animation, tmp_path / "juggle.glb")
     scene = trimesh.load_scene(tmp_path / "juggle.glb")
     assert {"left_hand", "right_hand", "Box"} <= set(scene.geometry)
     assert len(scene.geometry["right_hand"].faces) == len(FACES)
 
 
-def test_csv_names_every_number(performance: Animation, angles, tmp_path: Path) -> None:
-    write_csv(performance, tmp_path / "juggle.csv")
+def test_csv_names_every_number(animation: Animation, angles, tmp_path: Path) -> None:
+    write_csv(animation, tmp_path / "juggle.csv")
     with (tmp_path / "juggle.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == FRAMES
@@ -224,18 +221,18 @@ def test_csv_names_every_number(performance: Animation, angles, tmp_path: Path) 
     for side in SIDES:
         read = [float(row[f"{side}_{name.lower()}_rad"]) for name in DOF_NAMES]
         assert np.allclose(read, angles[side][7], atol=1e-6)
-        joints = performance.hands[side].world()[0][7]
+        joints = animation.hands[side].world()[0][7]
         read = [[float(row[f"{side}_{name.lower()}_{axis}"]) for axis in "xyz"] for name in JOINT_NAMES]
         assert np.allclose(read, joints, atol=1e-6)
     read = [float(row[f"the cup_{part}"]) for part in ("x", "y", "z", "qx", "qy", "qz", "qw")]
-    assert np.allclose(read, performance.objects["the cup"].poses[7], atol=1e-6)
+    assert np.allclose(read, animation.objects["the cup"].poses[7], atol=1e-6)
     assert [float(r["Box_tracked"]) for r in rows[6:9]] == [1.0, 0.0, 1.0]
 
 
-def test_a_hand_of_another_size_is_exported_at_its_size(performance: Animation, angles, tmp_path: Path) -> None:
-    hand = performance.hands["right"]
+def test_a_hand_of_another_size_is_exported_at_its_size(animation: Animation, angles, tmp_path: Path) -> None:
+    hand = animation.hands["right"]
     small = HandTrack(hand.wrist, hand.rotations, 0.9 * OFFSETS_M, hand.live)
-    write_gltf(Animation("small", 60.0, performance.time_s, {"right": small}), tmp_path / "small.glb")
+    write_gltf(Animation("small", 60.0, animation.time_s, {"right": small}), tmp_path / "small.glb")
     vertices = 0.9 * skin(*forward_kinematics(angles["right"][5]))
     assert np.allclose(
         Gltf(tmp_path / "small.glb").skinned("right_hand", 5), transform(hand.wrist[5], vertices), atol=2e-6
@@ -244,8 +241,8 @@ def test_a_hand_of_another_size_is_exported_at_its_size(performance: Animation, 
 
 def message(seq: int, t_s: float, x: float, state: str = "live", actor: str = "ann") -> HandsMessage:
     """A hands message of a half-closed left hand at `x`."""
-    shown = Shown(state, DOF_LIMITS_RAD @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]))
-    hands = hand_poses({"left": ShownHand(shown, "Box")}, 0.9)
+    shown = ShownHand(state, DOF_LIMITS_RAD @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), "Box")
+    hands = hand_poses({"left": shown}, 0.9)
     pose = np.array([x, 1.1, 0.0, 0.0, 0.0, 0.0, 1.0])
     bodies = (BodyPose(True, pose, "left_wrist"), BodyPose(state == "live", pose, "Box"))
     return HandsMessage("session", actor, seq, t_s, t_s + 0.6, 0.5, hands, bodies)
@@ -253,7 +250,7 @@ def message(seq: int, t_s: float, x: float, state: str = "live", actor: str = "a
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    """Two actors; the first one's performance has a gap, a second of waiting before it, and a lost stretch."""
+    """Two actors; the first one's animation has a gap, a second of waiting before it, and a lost stretch."""
     cube = load_library_mesh("cube")
     path = tmp_path / "stage.mcap"
     with RecordingWriter(path, {}, {"Box.ply": mesh_file(cube.vertices, cube.faces, 0.5)}) as writer:
@@ -267,7 +264,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_a_recording_is_exported_tick_by_tick(recording: Path, tmp_path: Path, angles) -> None:
-    stage = read_performance(recording)
+    stage = read_animation(recording)
     assert (len(stage.time_s), stage.rate_hz, list(stage.hands), list(stage.objects)) == (60, 60.0, ["left"], ["Box"])
     hand = stage.hands["left"]
     assert np.flatnonzero(~hand.live).tolist() == [20, 21, 30, 31, 32, 33, 34]
@@ -275,7 +272,7 @@ def test_a_recording_is_exported_tick_by_tick(recording: Path, tmp_path: Path, a
     assert hand.scale == pytest.approx(0.9)
     assert stage.objects["Box"].tracked.sum() == 53
     assert np.ptp(stage.meshes["Box"].vertices) == pytest.approx(0.5 * np.ptp(load_library_mesh("cube").vertices))
-    assert read_performance(recording, "bob").hands["left"].wrist[0, 0] == 5.0
+    assert read_animation(recording, "bob").hands["left"].wrist[0, 0] == 5.0
     positions, rotations = forward_kinematics(DOF_LIMITS_RAD @ [0.5, 0.5])
     joints, _ = hand_to_world("left", hand.wrist[3], 0.9 * positions, rotations)
     assert np.allclose(hand.world()[0][3], joints, atol=1e-9)
@@ -298,8 +295,11 @@ def test_the_command_writes_every_format(
         (["stage.mcap", "--format", "gltf", "--out", "x.fbx"], "must end in .glb or .gltf"),
         (["stage.mcap", "--format", "csv", "--out", "no/x.csv"], "its folder does not exist"),
         (["stage.mcap", "--format", "csv", "--out", "x.csv", "--actor", "eve"], "no actor 'eve'; it has ann, bob"),
-        (["stage.mcap", "--format", "csv", "--out", "x.csv", "--right-handed"], "is right-handed anyway"),
-        (["stage.mcap", "--format", "gltf", "--out", "x.glb", "--mesh", "Cup=c.obj"], "NAME one of Box"),
+        (["stage.mcap", "--format", "csv", "--out", "x.csv", "--right-handed"], "csv is always right-handed"),
+        (
+            ["stage.mcap", "--format", "gltf", "--out", "x.glb", "--mesh", "Cup=c.obj"],
+            "no object is called 'Cup'; the objects are Box",
+        ),
         (["walk.txt", "--format", "csv", "--out", "x.csv"], "holds no fingers; make them first: manipnet synthesize"),
         (["bad.npz", "--format", "csv", "--out", "x.csv"], "is no file of `manipnet synthesize`"),
         (["other.npz", "--format", "csv", "--out", "x.csv"], "is no file of `manipnet synthesize`"),

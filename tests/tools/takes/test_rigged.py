@@ -1,4 +1,4 @@
-"""Takes of a calibrated rig: the fingers are those of the wrists and props that its bodies carry."""
+"""Takes to which a calibrated rig is applied: their fingers are those of the true wrists and props."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +11,7 @@ from manipnet.geometry import Array, compose, invert, quat_exp
 from manipnet.recording.mcap_file import RecordingWriter
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
-from manipnet_tools.takes.rigged import read_rig, read_staged
+from manipnet_tools.takes.rigged import read_rig, read_rigged
 from manipnet_tools.takes.take import TakeError
 
 OFFSETS = {
@@ -52,7 +52,7 @@ def truth(part: str, pose: Array) -> BodySample:
 
 
 def tracked(part: str, pose: Array) -> BodySample:
-    """The marker cluster or body that carries a part."""
+    """The tracked body to which a part is attached."""
     T_world_body = compose(pose, invert(OFFSETS[part]))
     key = BODIES[part]
     number, name = (key, None) if isinstance(key, int) else (None, key)
@@ -100,7 +100,9 @@ def test_a_calibrated_take_has_the_fingers_of_its_true_wrists(rig: Path, tmp_pat
 
 def test_a_body_that_the_rig_names_and_the_take_lacks_is_named(rig: Path, tmp_path: Path) -> None:
     take = write(tmp_path / "true.mcap", truth)
-    with pytest.raises(TakeError, match=r"stage\.toml: bodies\.left_wrist is 'LW'; true has left_wrist, right_wrist"):
-        read_staged(take, read_rig(rig))
-    with pytest.raises(TakeError, match=r"--actor bob is not one of actor"):
+    with pytest.raises(
+        TakeError, match=r"stage\.toml: bodies\.left_wrist is 'LW', but the bodies of true are left_wrist, right_wrist"
+    ):
+        read_rigged(take, read_rig(rig))
+    with pytest.raises(TakeError, match=r"there is no actor 'bob'; the actors are actor"):
         read_rig(rig, "bob")

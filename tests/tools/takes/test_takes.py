@@ -36,10 +36,10 @@ def test_a_trajectory_is_left_handed_decimetres(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("", "motion.txt:1: '' is no rate"),
-        ("fast\n1,2\n", "motion.txt:1: 'fast' is no rate"),
-        ("120\n", "holds no frame"),
-        ("120\n1,2,3\n", "motion.txt:2: 3 values; a frame has 21"),
+        ("", "motion.txt:1: '' is not a rate"),
+        ("fast\n1,2\n", "motion.txt:1: 'fast' is not a rate"),
+        ("120\n", "has no frames"),
+        ("120\n1,2,3\n", "motion.txt:2: 3 values; a frame must have 21"),
         ("120\n" + "1," * 20 + "x\n", "motion.txt:2: could not convert"),
         ("120\n" + "1," * 20 + "nan\n", "motion.txt:2: a value is not finite"),
         ("120\n" + "0," * 20 + "0\n", "object has a zero quaternion"),
@@ -93,7 +93,7 @@ def test_a_motive_csv_in_millimetres_with_euler_angles(tmp_path: Path) -> None:
     take = motive_csv(tmp_path, [f"0,0.0,{body},{body},{body},1,1,1"], "XYZ", "Millimeters")
     pose = take.bodies["Box"].poses[0]
     assert np.allclose(pose[:3], [1.0, 2.0, -3.0])
-    # About x, then about the y axis that this has turned to z: the body's z comes to lie along the world's x.
+    # A turn about x moves the body's y axis to z; the turn about that then moves its z axis to the world's x.
     assert np.allclose(quat_rotate(pose[3:], np.array([0.0, 0.0, 1.0])), [1.0, 0.0, 0.0])
     assert np.allclose(quat_rotate(pose[3:], np.array([0.0, 1.0, 0.0])), [0.0, 0.0, 1.0])
 
@@ -101,7 +101,7 @@ def test_a_motive_csv_in_millimetres_with_euler_angles(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
-        ("Format Version", "Something", "is no CSV export of Motive"),
+        ("Format Version", "Something", "is not a CSV export of Motive"),
         ("Meters", "Furlongs", "Length Units is 'Furlongs'; allowed are meters"),
         ("Rigid Body", "Bone", "has no rigid body with rotation and position, only Bone"),
         ("Rate,120.0", "Rate,often", "Export Frame Rate is 'often'"),
@@ -136,7 +136,7 @@ def test_a_recording_is_a_take(tmp_path: Path) -> None:
     assert np.allclose(track.poses[19:, 0], np.arange(20, 51) / 100)
 
 
-def test_what_is_no_take_is_refused(tmp_path: Path) -> None:
+def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(TakeError, match="no such take"):
         read_take(tmp_path / "gone.csv")
     (tmp_path / "a.fbx").touch()

@@ -1,5 +1,5 @@
-"""A batch on a Ray cluster. Jobs travel with their files, so the machines need no disk in common, only the same
-version of this program. A few jobs more than there are processors are on their way at a time, so memory is bounded.
+"""Runs a batch on a Ray cluster. Jobs carry their files with them, so the machines need no common disk, only the same
+version of this program. The number of submitted jobs is bounded, and so is their memory.
 
 Source: docs.ray.io, "Tasks" and "Using ray.wait to limit the number of pending tasks".
 """
@@ -21,34 +21,34 @@ from manipnet_tools.batch.local import Progress
 from manipnet_tools.takes.rigged import RigText
 
 OWN: Final = "local"
-"""In the place of an address: a cluster of our own on this machine, for as long as the batch takes."""
+"""Used instead of an address, this starts a cluster on this machine that lives as long as the batch."""
 OBJECT_STORE_BYTES: Final = 256 << 20
 AHEAD: Final = 2
-"""Jobs on their way beyond those that can run at once."""
+"""Jobs that are submitted beyond those that can run at the same time."""
 
 Files = dict[str, bytes]
 
 
 class ClusterError(ValueError):
-    """A cluster that cannot be used; the text says which, why, and what to do."""
+    """A cluster cannot be used; the text names it, the reason and the remedy."""
 
 
 @dataclass(frozen=True)
-class Parcel:
-    """A job with its files."""
+class PackedJob:
+    """A job with the contents of its files, as it is sent to another machine."""
 
     name: str
     take: Files
     folder: str | None
-    """The take's name where it is a folder."""
+    """The name of a take that is a folder."""
     look_ahead_s: float
 
 
 @contextmanager
 def cluster(address: str, processes: int) -> Iterator[int]:
-    """Join the cluster at `address`, or start one of our own; gives its number of processors.
+    """Join the cluster at `address`, or start one for `OWN`, and yield its number of processors.
 
-    At the end a cluster of our own is shut down; another's is only left.
+    In the end, a cluster that was started here is shut down; any other keeps running.
     """
     options: dict[str, Any] = {"address": address, "log_to_driver": False, "logging_level": logging.ERROR}
     if address == OWN:
@@ -56,22 +56,24 @@ def cluster(address: str, processes: int) -> Iterator[int]:
     try:
         ray.init(**options)
     except (ConnectionError, RuntimeError, ValueError, OSError) as error:
-        remedy = f"give the address `ray start --head` shows, auto for this machine's, or {OWN}"
-        raise ClusterError(f"--ray {address}: no cluster there ({str(error).splitlines()[0]}); {remedy}") from None
+        remedy = (
+            f"give the address that `ray start --head` prints, auto for this machine's cluster, or {OWN} to start one"
+        )
+        raise ClusterError(f"--ray {address}: cannot join a cluster ({str(error).splitlines()[0]}); {remedy}") from None
     try:
         yield max(1, int(ray.cluster_resources().get("CPU", 1)))
     finally:
         ray.shutdown()
 
 
-def run_there(jobs: Sequence[Job], processors: int, progress: Progress) -> Iterator[Outcome]:
-    """Do the jobs on the cluster that was joined; outcomes as they come, results written here."""
+def run_on_cluster(jobs: Sequence[Job], processors: int, progress: Progress) -> Iterator[Outcome]:
+    """Do the jobs on the joined cluster, write the results on this machine and yield outcomes as they arrive."""
     if not jobs:
         return
     model = ray.put(_read(sorted(file for file in jobs[0].model.iterdir() if file.is_file())))
     meshes = {name: ray.put((file.name, file.read_bytes())) for name, file in jobs[0].meshes.items()}
     rig = ray.put(_packed(jobs[0].rig))
-    remote = ray.remote(num_cpus=1, max_retries=1)(_do_parcel)
+    remote = ray.remote(num_cpus=1, max_retries=1)(_do_packed)
     running: dict[Any, Job] = {}
     for job in jobs:
         while len(running) >= processors + AHEAD:
@@ -81,26 +83,26 @@ def run_there(jobs: Sequence[Job], processors: int, progress: Progress) -> Itera
             if (made := finished(prepared)) is not None:
                 yield made
                 continue
-            parcel = Parcel(job.name, _read(take_files(job.take)), _folder(job.take), job.look_ahead_s)
+            packed = PackedJob(job.name, _read(take_files(job.take)), _folder(job.take), job.look_ahead_s)
         except (ValueError, OSError) as error:
             yield failure(job, error)
             continue
         own = {name: meshes[name] for name in prepared.meshes}
-        running[remote.remote(parcel, model, rig, list(own), *own.values())] = job
+        running[remote.remote(packed, model, rig, list(own), *own.values())] = job
         progress(job.name, 0, 0)
     while running:
         yield _next(running)
 
 
 def _next(running: dict[Any, Job]) -> Outcome:
-    """Wait for one of the tasks to end, and keep its result."""
+    """Wait for one of the tasks to end, and write its result."""
     (task,), _ = ray.wait(list(running), num_returns=1)
     job = running.pop(task)
     try:
         outcome, npz, note = ray.get(task)
     except RayError as error:
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else type(error).__name__
-        return Outcome(job.name, "failed", reason=f"its machine or process was lost: {reason}")
+        return Outcome(job.name, "failed", reason=f"the cluster did not finish it: {reason}")
     if outcome.state == "failed":
         return outcome
     try:
@@ -111,25 +113,28 @@ def _next(running: dict[Any, Job]) -> Outcome:
     return outcome
 
 
-def _do_parcel(
-    parcel: Parcel,
+def _do_packed(
+    packed: PackedJob,
     model: Files,
     rig: tuple[RigText, Files] | None,
     names: list[str],
     *meshes: tuple[str, bytes],
 ) -> tuple[Outcome, bytes, bytes]:
-    """On a machine of the cluster: the job on its own disk, and the files that came out."""
+    """Do a job on a machine of the cluster, in a temporary folder.
+
+    Returns the outcome and the contents of the result and its note.
+    """
     with TemporaryDirectory(prefix="manipnet-") as folder:
         place = Path(folder)
-        take = place / "take" / (parcel.folder or "")
-        _write(take, parcel.take)
-        take = take if parcel.folder else take / next(iter(parcel.take))
+        take = place / "take" / (packed.folder or "")
+        _write(take, packed.take)
+        take = take if packed.folder else take / next(iter(packed.take))
         files = {}
         for name, (file, content) in zip(names, meshes, strict=True):
             _write(place / f"mesh{len(files)}", {file: content})
             files[name] = place / f"mesh{len(files)}" / file
         rig_here = None if rig is None else _unpacked(*rig, place / "rig")
-        job = Job(parcel.name, take, files, _model_here(model), parcel.look_ahead_s, rig_here, place / "result.npz")
+        job = Job(packed.name, take, files, _model_here(model), packed.look_ahead_s, rig_here, place / "result.npz")
         outcome = do(job)
         if outcome.state == "failed":
             return outcome, b"", b""
@@ -137,7 +142,7 @@ def _do_parcel(
 
 
 def _model_here(files: Files) -> Path:
-    """The bundle's folder on this machine, written once."""
+    """The bundle's folder on this machine, which is written once."""
     digest = hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest()[:24]
     folder = Path(gettempdir()) / f"manipnet-model-{digest}"
     if not folder.is_dir():
@@ -151,7 +156,7 @@ def _model_here(files: Files) -> Path:
 
 
 def _packed(rig: RigText | None) -> tuple[RigText, Files] | None:
-    """A rig with its mesh files, in the order of its props."""
+    """A rig with the contents of its mesh files, in the order of its props."""
     if rig is None:
         return None
     return rig, {f"{k}{mesh.path.suffix}": mesh.path.read_bytes() for k, mesh in enumerate(rig.meshes.values())}

@@ -1,4 +1,4 @@
-"""`manipnet batch`: fingers for a folder of takes."""
+"""`manipnet batch`: synthesises the fingers of all takes in a folder."""
 
 import json
 import os
@@ -12,94 +12,103 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from rich.text import Text
 
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet_tools.batch.job import Job, Outcome, keep
-from manipnet_tools.batch.local import run_here
+from manipnet_tools.batch.local import run_locally
+from manipnet_tools.takes.meshes import named_files
 from manipnet_tools.takes.rigged import read_rig
+from manipnet_tools.terminal import open_console
 
 FILE_TAKES = (".csv", ".mcap", ".txt")
 SUMMARY = "summary.json"
 TICK_HZ = 60.0
+COLOURS = {"done": "green", "skipped": "dim", "failed": "red"}
 
 
 class BatchError(ValueError):
-    """A batch that cannot be begun, or of which a part failed; the text says what and what to do."""
+    """A batch cannot start, or some of its takes failed; the text names the reason and the remedy."""
 
 
 @dataclass(frozen=True)
 class BatchOptions:
-    """Write the fingers of every take in a folder, as `manipnet synthesize` does for one.
+    """Write the fingers of every take in a folder, as `manipnet synthesize` does for one take.
 
-    What is finished and still up to date is skipped, so a batch that was stopped goes on where it was. A take that
-    fails is reported, and the rest goes on.
+    Results that are up to date are skipped, so a batch that was stopped continues where it was. A take that fails is
+    reported and does not stop the others.
     """
 
     folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
-    """Where the takes are, at any depth: folders of BVH files, trajectory texts, Motive CSVs, recordings."""
+    """The folder to search for takes, at any depth: folders of BVH files, trajectory texts, Motive CSVs, recordings."""
     out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
-    """Where the results go: one .npz per take and summary.json."""
+    """The folder for the results: one .npz per take, and summary.json."""
     mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")] = ()
-    """Mesh of an object, in metres, for all takes that have one of that name; recordings may keep their own."""
+    """An object and its mesh in metres, for all takes that have the object; may be given several times. Takes without
+    any use the meshes in their recording, or else those of the rig."""
     model: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_MODEL
-    """A shipped bundle's name or a bundle folder."""
+    """The model: the name of a shipped bundle, or a bundle's folder."""
     look_ahead: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
-    """Seconds of the future the synthesis knows, 0 to 0.5; the rest it forecasts."""
+    """How much of the future the synthesis reads from the take, 0 to 0.5; it forecasts the rest."""
     rig: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The rig of all takes: whose bodies are what, calibrated; recordings of a server know by themselves."""
+    """The rig file of all takes, which says which body is which, and how each is calibrated. Recordings made beside a
+    server need none."""
     actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Who of a rig with several actors; the first by default."""
+    """The actor, if the rig has several; by default the first."""
     jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Takes at a time on this machine; by default one per processor."""
+    """Number of takes at the same time on this machine; by default one per processor."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
-    """Work on this Ray cluster instead: HOST:PORT, auto, or local for one of its own here."""
+    """Work on a Ray cluster instead: HOST:PORT, auto for the one on this machine, or local to start one here."""
 
 
 def run(options: BatchOptions) -> None:
-    """Do what is not done yet. Raises `BatchError`, `BundleError`, `MeshError`, `ClusterError` and `OSError`."""
+    """Make every result that is missing or out of date.
+
+    Raises `BatchError`, `BundleError`, `MeshError`, `ClusterError` and `OSError`.
+    """
     jobs = plan(options)
     options.out.mkdir(parents=True, exist_ok=True)
-    console = Console(stderr=True)
+    console = open_console()
     outcomes: list[Outcome] = []
     try:
         with ExitStack() as opened:
-            bars = opened.enter_context(_Bars(console, len(jobs)))
+            bars = opened.enter_context(_ProgressBars(console, len(jobs)))
             for outcome in _outcomes(options, jobs, bars, opened):
                 outcomes.append(outcome)
                 bars.finish(outcome)
     finally:
         outcomes.sort(key=lambda outcome: outcome.name)
-        report = {"model": options.model, "look_ahead_s": options.look_ahead, "takes": [asdict(o) for o in outcomes]}
-        keep(options.out / SUMMARY, json.dumps(report, indent=2).encode())
+        summary = {"model": options.model, "look_ahead_s": options.look_ahead, "takes": [asdict(o) for o in outcomes]}
+        keep(options.out / SUMMARY, json.dumps(summary, indent=2).encode())
         console.print(table(outcomes))
         if len(outcomes) < len(jobs):
-            console.print(f"{len(jobs) - len(outcomes)} takes are left; the same command goes on with them")
+            console.print(f"{len(jobs) - len(outcomes)} takes are left; run the same command again to continue")
     if failed := sum(outcome.state == "failed" for outcome in outcomes):
         raise BatchError(
-            f"{failed} of {len(jobs)} takes failed, for the reasons above; the others are in {options.out}"
+            f"{failed} of {len(jobs)} takes failed, for the reasons above; the other results are in {options.out}"
         )
 
 
 def plan(options: BatchOptions) -> list[Job]:
-    """A job per take. Raises `BatchError`, `BundleError`, `MeshError`, `ConfigError` and `TakeError` for what no take
-    could be done with."""
+    """One job per take.
+
+    Raises `BatchError`, `BundleError`, `MeshError`, `ConfigError` and `TakeError` for options that would make every
+    take fail.
+    """
     if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
-        raise BatchError(f"--look-ahead is {options.look_ahead} s; allowed are 0 to {MAX_LOOK_AHEAD_S}")
+        raise BatchError(f"--look-ahead is {options.look_ahead:g} s; allowed are 0 to {MAX_LOOK_AHEAD_S:g}")
     if options.jobs is not None and options.jobs < 1:
-        raise BatchError(f"--jobs is {options.jobs}; allowed are 1 and more")
+        raise BatchError(f"--jobs is {options.jobs}; it must be at least 1")
     takes = find_takes(options.folder)
     if not takes:
-        raise BatchError(f"{options.folder}: holds no take; a take is a folder of BVH files, {', '.join(FILE_TAKES)}")
-    meshes = {}
-    for text in options.mesh:
-        name, equals, file = text.partition("=")
-        if not (name and equals and file):
-            raise BatchError(f"--mesh {text}: must be NAME=FILE, NAME an object of one of the takes")
-        load_mesh(file)
-        meshes[name] = Path(file).absolute()
+        raise BatchError(
+            f"{options.folder}: no take found; a take is a folder of BVH files, or a file {', '.join(FILE_TAKES)}"
+        )
+    meshes = {name: file.absolute() for name, file in named_files(options.mesh).items()}
+    for file in meshes.values():
+        load_mesh(file)  # a mesh that cannot be read would make every take fail
     model, rig = load_bundle(options.model).folder.absolute(), read_rig(options.rig, options.actor)
     names = take_names(options.folder, takes)
     return [
@@ -109,23 +118,23 @@ def plan(options: BatchOptions) -> list[Job]:
 
 
 def find_takes(folder: Path) -> list[Path]:
-    """All takes in a folder, itself included, at any depth. Raises `BatchError` where there is no folder."""
+    """All takes in a folder at any depth, the folder itself included. Raises `BatchError` if there is no folder."""
     if not folder.is_dir():
-        raise BatchError(f"{folder}: is no folder; for a single take there is `manipnet synthesize`")
+        raise BatchError(f"{folder}: is not a folder; use `manipnet synthesize` for a single take")
     folders = [place for place in [folder, *folder.rglob("*")] if place.is_dir() and any(place.glob("*Hand.bvh"))]
     files = [file for file in folder.rglob("*") if file.suffix.lower() in FILE_TAKES and file.is_file()]
     return sorted([*folders, *(file for file in files if file.suffix.lower() != ".txt" or _is_trajectory(file))])
 
 
 def take_names(folder: Path, takes: Sequence[Path]) -> list[str]:
-    """A name for each take: its path in the folder, without the suffix where that tells them apart."""
+    """A name for each take: its path in the folder, without the suffix unless two takes differ only in that."""
     paths = ["_".join(take.relative_to(folder).parts) or folder.absolute().name for take in takes]
     short = [Path(path).stem if take.is_file() else path for path, take in zip(paths, takes, strict=True)]
     return [path if short.count(name) > 1 else name for path, name in zip(paths, short, strict=True)]
 
 
 def _is_trajectory(file: Path) -> bool:
-    """Folders hold all sorts of texts; a trajectory's first line is a number."""
+    """Whether a text is a trajectory, whose first line is a number."""
     with file.open(errors="replace") as text:
         try:
             float(text.readline(100))
@@ -134,35 +143,36 @@ def _is_trajectory(file: Path) -> bool:
     return True
 
 
-def _outcomes(options: BatchOptions, jobs: Sequence[Job], bars: "_Bars", opened: ExitStack) -> Iterator[Outcome]:
+def _outcomes(
+    options: BatchOptions, jobs: Sequence[Job], bars: "_ProgressBars", opened: ExitStack
+) -> Iterator[Outcome]:
     processes = options.jobs or os.cpu_count() or 1
     if options.ray is None:
-        return run_here(jobs, processes, bars.advance)
-    from manipnet_tools.batch.cluster import cluster, run_there
+        return run_locally(jobs, processes, bars.advance)
+    from manipnet_tools.batch.cluster import cluster, run_on_cluster
 
     processors = opened.enter_context(cluster(options.ray, processes))
-    return run_there(jobs, processors, bars.advance)
+    return run_on_cluster(jobs, processors, bars.advance)
 
 
 def table(outcomes: Sequence[Outcome]) -> Table:
     """One line per take."""
-    lines = Table("take", "result", "length", "took", "times real time", "why")
-    colours = {"done": "green", "skipped": "dim", "failed": "red"}
+    lines = Table("take", "result", "length", "time taken", "times real time", "reason")
     for outcome in outcomes:
         length_s = outcome.frames / TICK_HZ
         lines.add_row(
             outcome.name,
-            f"[{colours[outcome.state]}]{'up to date' if outcome.state == 'skipped' else outcome.state}[/]",
+            Text("up to date" if outcome.state == "skipped" else outcome.state, COLOURS[outcome.state]),
             f"{length_s:.1f} s" if outcome.frames else "",
             f"{outcome.seconds:.1f} s" if outcome.state == "done" else "",
             f"{length_s / outcome.seconds:.1f}" if outcome.state == "done" else "",
-            outcome.reason.replace("[", "\\["),
+            outcome.reason,
         )
     return lines
 
 
-class _Bars:
-    """A bar for all takes, and one for each that is being done."""
+class _ProgressBars:
+    """A progress bar for all takes, and one for each take in progress."""
 
     def __init__(self, console: Console, takes: int) -> None:
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
@@ -170,7 +180,7 @@ class _Bars:
         self._all = self._progress.add_task("takes", total=takes)
         self._takes: dict[str, TaskID] = {}
 
-    def __enter__(self) -> "_Bars":
+    def __enter__(self) -> "_ProgressBars":
         self._progress.start()
         return self
 
@@ -187,4 +197,4 @@ class _Bars:
             self._progress.remove_task(bar)
         self._progress.advance(self._all)
         if outcome.state == "failed":
-            self._progress.print(f"{outcome.name} failed: {outcome.reason}", markup=False)
+            self._progress.print(f"{outcome.name} failed: {outcome.reason}")

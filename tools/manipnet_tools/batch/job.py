@@ -1,4 +1,4 @@
-"""One take of a batch: what its result depends on, and making it. The same on this machine and on another."""
+"""One take of a batch: what its result depends on, and how it is made, on this machine or another."""
 
 import hashlib
 import json
@@ -10,65 +10,66 @@ from pathlib import Path
 from typing import Literal
 
 from manipnet import __version__
+from manipnet.common.atomic_file import replacing
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.commands.synthesize import read_shapes, synthesise, write_arrays
-from manipnet_tools.takes.rigged import RigText, Staged, read_staged
+from manipnet_tools.takes.rigged import RiggedTake, RigText, read_rigged
 from manipnet_tools.takes.rollout import tick_take
 from manipnet_tools.takes.take import TakeError
 
 Advance = Callable[[int, int], None]
-"""Hears how many hand-ticks are done, of how many."""
+"""Receives the number of hand-ticks done and their total."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A take to synthesise."""
+    """A take to synthesise, and with what."""
 
     name: str
-    """Of the take within the batch; its result is called so."""
+    """The take's name within the batch, after which the result is named."""
     take: Path
     meshes: Mapping[str, Path]
-    """Mesh files by object, also of objects that this take does not have."""
+    """Mesh files by object, which may include objects that are not in this take."""
     model: Path
     """The bundle's folder."""
     look_ahead_s: float
     rig: RigText | None
-    """What the take's bodies are, where it does not know by itself."""
+    """The rig file, for a take that does not say which body is which."""
     out: Path
-    """The file to write, .npz; what it was made from is beside it, .json."""
+    """The file to write, .npz. A .json file of the same name says what the result was made from."""
 
     @property
     def note(self) -> Path:
-        """Where it is written what a finished result was made from."""
+        """The file that says what the result was made from."""
         return self.out.with_name(f"{self.out.stem}.json")
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job."""
+    """How a job ended."""
 
     name: str
     state: Literal["done", "skipped", "failed"]
     frames: int = 0
     seconds: float = 0.0
-    """How long it took."""
+    """Duration of the work."""
     reason: str = ""
-    """Why it failed."""
+    """The reason of a failure."""
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A job whose take has been read: its own meshes, and the hash of everything its result depends on."""
+    """A job whose take has been read, with the meshes of its objects and a hash of all that the result depends on."""
 
     job: Job
-    staged: Staged
+    rigged: RiggedTake
     meshes: dict[str, Path]
     key: str
 
 
 def do(job: Job, advance: Advance = lambda done, total: None) -> Outcome:
-    """Synthesise one take unless its result is there. What is wrong with a take is an outcome, not an exception."""
+    """Synthesise one take unless its result is up to date. An error in a take gives a failed outcome, no exception."""
     start_s = time.monotonic()
     try:
         prepared = prepare(job)
@@ -78,55 +79,54 @@ def do(job: Job, advance: Advance = lambda done, total: None) -> Outcome:
 
 
 def failure(job: Job, error: Exception, seconds: float = 0.0) -> Outcome:
-    """The outcome of a job that failed; that it is about this take need not be said again."""
+    """The outcome of a job that failed. Its reason does not repeat the name of the take."""
     return Outcome(job.name, "failed", seconds=seconds, reason=str(error).removeprefix(f"{job.take}: "))
 
 
 def prepare(job: Job) -> Prepared:
-    """Read the take, and hash what the result depends on.
+    """Read the take, and hash everything that the result depends on.
 
     Raises `TakeError`, `ConfigError`, `BundleError` and `OSError`.
     """
-    staged = read_staged(job.take, job.rig)
-    take, rig_meshes = staged.take, {} if job.rig is None else job.rig.meshes
+    rigged = read_rigged(job.take, job.rig)
+    take, rig_meshes = rigged.take, {} if job.rig is None else job.rig.meshes
     meshes = {name: file for name, file in sorted(job.meshes.items()) if name in take.objects}
     if not meshes and job.meshes and job.take.suffix.lower() != ".mcap" and not rig_meshes:
-        have, given = ", ".join(take.objects) or "none", ", ".join(job.meshes)
-        raise TakeError(f"{job.take}: its objects are {have}; --mesh names none of them, only {given}")
+        objects, given = ", ".join(take.objects) or "none", ", ".join(job.meshes)
+        raise TakeError(f"{job.take}: its objects are {objects}, but --mesh names {given}")
     digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s}".encode())
     if job.rig is not None:
         digest.update(f"{job.rig.actor} {job.rig.text}".encode())
-    rigged = ((name, file.path) for name, file in sorted(rig_meshes.items()))
-    for name, file in [*((file.name, file) for file in take_files(job.take)), *meshes.items(), *rigged]:
+    of_rig = ((name, file.path) for name, file in sorted(rig_meshes.items()))
+    for name, file in [*((file.name, file) for file in take_files(job.take)), *meshes.items(), *of_rig]:
         digest.update(f" {name} {file.stat().st_size} ".encode() + file.read_bytes())
-    return Prepared(job, staged, meshes, digest.hexdigest())
+    return Prepared(job, rigged, meshes, digest.hexdigest())
 
 
 def take_files(take: Path) -> list[Path]:
-    """The files of a take."""
+    """The files that make up a take."""
     return sorted(take.glob("*.bvh")) if take.is_dir() else [take]
 
 
 def finished(prepared: Prepared) -> Outcome | None:
-    """The outcome of an earlier run that made the same; None where there is none."""
+    """The outcome of an earlier run that made the same result, or None."""
     try:
-        said = json.loads(prepared.job.note.read_text(encoding="utf-8"))
-        if said.pop("key") == prepared.key and prepared.job.out.is_file():
-            return replace(Outcome(**said), state="skipped")
+        note = json.loads(prepared.job.note.read_text(encoding="utf-8"))
+        if note.pop("key") == prepared.key and prepared.job.out.is_file():
+            return replace(Outcome(**note), state="skipped")
     except (OSError, ValueError, KeyError, TypeError):
-        pass  # not there, or cut off: made anew
+        pass  # the note is missing or cut off, so the result is made again
     return None
 
 
 def keep(path: Path, content: bytes) -> None:
-    """Write a file that nobody ever sees half written. Raises `OSError`."""
-    part = path.with_name(f"{path.name}.part")
-    part.write_bytes(content)
-    part.replace(path)
+    """Write a file so that no reader ever sees a part of it. Raises `OSError`."""
+    with replacing(path) as file:
+        file.write(content)
 
 
 def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
-    job, take = prepared.job, prepared.staged.take
+    job, take = prepared.job, prepared.rigged.take
     shapes = read_shapes([f"{name}={file}" for name, file in prepared.meshes.items()], take, job.take, job.rig)
     ticks = tick_take(take, job.look_ahead_s)
     total, done = 2 * len(ticks.time_s), 0
@@ -137,7 +137,7 @@ def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
         advance(done, total)
 
     advance(0, total)
-    hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count, prepared.staged.hand_scale)
+    hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count, prepared.rigged.hand_scale)
     part = job.out.with_name(f"{job.out.name}.part")
     with part.open("wb") as file:
         write_arrays(file, ticks, shapes, hands)
@@ -149,5 +149,5 @@ def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
 
 @lru_cache(maxsize=1)
 def _bundle(model: Path) -> Bundle:
-    """One model per process."""
+    """Load the bundle once per process."""
     return load_bundle(model)

@@ -1,6 +1,7 @@
-"""A batch on this machine: a few processes, each doing one take after the other.
+"""Runs a batch on this machine, in several processes that do one take after the other.
 
-A process that dies, of a crash or because memory ran out, costs the take it was at; a new one takes its place.
+When a process dies, because of a crash or for lack of memory, only its current take fails, and a new process takes its
+place.
 """
 
 import multiprocessing
@@ -13,14 +14,14 @@ from multiprocessing.connection import Connection, wait
 from manipnet_tools.batch.job import Job, Outcome, do
 
 END_S = 1.0
-"""What an idle process gets to end by itself."""
+"""Time in which an idle process may end by itself."""
 
 Progress = Callable[[str, int, int], None]
-"""Hears the name of a job, and how many of its hand-ticks are done, of how many."""
+"""Receives the name of a job, the number of its hand-ticks done and their total."""
 
 
 class Worker:
-    """A process and the job it is at."""
+    """A process and its current job."""
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
@@ -31,7 +32,7 @@ class Worker:
         far.close()
 
     def begin(self, job: Job) -> "Worker":
-        """Send it to work; returns itself, or a new one if it has died since its last job."""
+        """Start a job; returns this worker, or a new one if the process has died since its last job."""
         try:
             self.connection.send(job)
         except OSError:
@@ -41,7 +42,7 @@ class Worker:
         return self
 
     def end(self) -> str:
-        """End the process; how it had ended."""
+        """End the process, and return how it ended."""
         self.connection.close()
         self._process.join(END_S)
         code = self._process.exitcode
@@ -50,8 +51,9 @@ class Worker:
         return f"killed by {signal.Signals(-code).name}" if code is not None and code < 0 else f"exit status {code}"
 
 
-def run_here(jobs: Sequence[Job], processes: int, progress: Progress) -> Iterator[Outcome]:
-    """Do the jobs with that many processes; outcomes as they come. Closing the iterator ends the processes."""
+def run_locally(jobs: Sequence[Job], processes: int, progress: Progress) -> Iterator[Outcome]:
+    """Do the jobs with a number of processes, and yield outcomes as they arrive. Closing the iterator ends the
+    processes."""
     waiting = deque(jobs)
     workers = [Worker() for _ in range(min(processes, len(jobs)))]
     try:
@@ -59,7 +61,7 @@ def run_here(jobs: Sequence[Job], processes: int, progress: Progress) -> Iterato
         while busy := {worker.connection: worker for worker in workers if worker.job is not None}:
             for connection in wait(list(busy)):
                 worker = busy[connection]  # type: ignore[index]
-                outcome = _hear(worker, progress)
+                outcome = _receive(worker, progress)
                 if outcome is None:
                     continue
                 worker.job = None
@@ -72,32 +74,32 @@ def run_here(jobs: Sequence[Job], processes: int, progress: Progress) -> Iterato
             worker.end()
 
 
-def _hear(worker: Worker, progress: Progress) -> Outcome | None:
-    """What a worker says: its outcome, or None for progress. A dead one's outcome is a failure."""
+def _receive(worker: Worker, progress: Progress) -> Outcome | None:
+    """A worker's outcome, or None if it reported progress. The outcome of a dead worker is a failure."""
     assert worker.job is not None
     try:
-        said = worker.connection.recv()
+        received = worker.connection.recv()
     except (EOFError, OSError):
-        reason = f"its process died ({worker.end()}): out of memory? Try fewer --jobs, or a smaller take or mesh"
-        return Outcome(worker.job.name, "failed", reason=reason)
-    if isinstance(said, Outcome):
-        return said
-    progress(worker.job.name, *said)
+        remedy = "perhaps for lack of memory; try fewer --jobs, a shorter take or a smaller mesh"
+        return Outcome(worker.job.name, "failed", reason=f"its process died ({worker.end()}), {remedy}")
+    if isinstance(received, Outcome):
+        return received
+    progress(worker.job.name, *received)
     return None
 
 
 def _serve(connection: Connection) -> None:
-    """The process of a worker: do what comes, until nobody is there to hear of it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    """The process of a worker: do jobs until the other end closes the connection."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         while True:
             job = connection.recv()
-            connection.send(do(job, lambda done, total: _tell(connection, done, total)))
+            connection.send(do(job, lambda done, total: _report(connection, done, total)))
     except (EOFError, OSError):
         pass
 
 
-def _tell(connection: Connection, done: int, total: int) -> None:
+def _report(connection: Connection, done: int, total: int) -> None:
     if done % 120 == 0 or done == total:  # once a second of the take
         connection.send((done, total))

@@ -16,7 +16,7 @@ from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer
 from manipnet.telemetry import StageClock, Telemetry, Timings
 from manipnet.wire import HandsMessage, encode_binary, encode_msgpack

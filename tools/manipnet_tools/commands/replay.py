@@ -1,4 +1,4 @@
-"""`manipnet replay`: a take streamed to a server at its own rate, as a tracker would."""
+"""`manipnet replay`: streams a take to a server at the take's own rate, as a tracker would."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -9,17 +9,17 @@ from typing import Annotated
 import numpy as np
 import tyro
 from numpy.typing import NDArray
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from manipnet.config.settings import ConfigError, parse_endpoint
+from manipnet import inputs
+from manipnet.common.options import ConfigError, parse_endpoint
 from manipnet.geometry import Array, quat_slerp
-from manipnet.inputs.playback import BodySender, OscBodySender, Played, ZmqBodySender, looped, play
+from manipnet.inputs.playback import BodySender, Played, looped, play
+from manipnet.runtime.signals import stop_on_signals
 from manipnet.wire.bodies import BodyFrame, BodySample
-from manipnet_tools.signals import stop_on_signals
 from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
+from manipnet_tools.terminal import open_console
 
-PORTS = {"tcp": 5556, "osc": 39540}
 RATES_HZ = (1.0, 1000.0)
 SPEEDS = (0.01, 100.0)
 SHOW_S = 0.2
@@ -30,27 +30,27 @@ class ReplayOptions:
     """Stream a take to a running server."""
 
     take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
-    """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
+    """The take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
     to: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT|osc://HOST:PORT")]
-    """Where to: the server's --input-port over ZeroMQ (tcp://) or its --osc-port (osc://)."""
+    """Where to send it: the server's --input-port over ZeroMQ (tcp://) or its --osc-port (osc://)."""
     speed: Annotated[float, tyro.conf.arg(metavar="TIMES")] = 1.0
-    """Times as fast. Time stamps stay the take's own."""
+    """Play this many times as fast. The time stamps remain those of the take."""
     loop: bool = False
-    """Play over and over, until stopped; time goes on rising."""
+    """Repeat until stopped; the time stamps keep rising."""
     rate: Annotated[float | None, tyro.conf.arg(metavar="HZ")] = None
-    """Frames per second, resampled; the take's own rate by default."""
+    """Resample to this rate; by default the take keeps its own."""
 
 
 def run(options: ReplayOptions) -> None:
-    """Play to the end, or for ever. Raises `TakeError`, `ConfigError` and `PlayError`."""
+    """Play to the end, or until stopped. Raises `TakeError`, `ConfigError` and `PlayError`."""
     if not SPEEDS[0] <= options.speed <= SPEEDS[1]:
-        raise TakeError(f"--speed is {options.speed}; allowed are {SPEEDS[0]} to {SPEEDS[1]}")
+        raise TakeError(f"--speed is {options.speed:g}; allowed are {SPEEDS[0]:g} to {SPEEDS[1]:g}")
     take = read_take(options.take)
     if options.rate is not None:
         take = resample(take, options.rate)
     frames = list(take_frames(take))
     sender = connect(options.to)
-    console = Console(stderr=True)
+    console = open_console()
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[state]}"))
     try:
         with Progress(*columns, console=console) as progress, stop_on_signals() as stopping:
@@ -69,22 +69,24 @@ def run(options: ReplayOptions) -> None:
 
 
 def connect(url: str) -> BodySender:
-    """The sender to `tcp://HOST[:PORT]` or `osc://HOST[:PORT]`. Raises `ConfigError` and `PlayError`."""
+    """The sender to `SCHEME://HOST[:PORT]`, with a scheme of some input. Raises `ConfigError` and `PlayError`."""
     scheme, separator, rest = url.partition("://")
-    if not separator or scheme not in PORTS:
-        raise ConfigError(f"--to {url} must be tcp://HOST:PORT (ZeroMQ) or osc://HOST:PORT")
-    host, port = parse_endpoint(rest, PORTS[scheme])
-    return ZmqBodySender(host, port) if scheme == "tcp" else OscBodySender(host, port)
+    playable = {declared.scheme or declared.name: declared for declared in inputs.INPUTS if declared.player is not None}
+    declared = playable.get(scheme) if separator else None
+    if declared is None or declared.player is None or declared.default_port is None:
+        allowed = " or ".join(f"{scheme}://HOST:PORT" for scheme in playable)
+        raise ConfigError(f"--to {url} is not an address to play to; it must be {allowed}")
+    return declared.player(*parse_endpoint(rest, declared.default_port))
 
 
 def state(played: Played) -> str:
-    """How a performance stands, in words."""
+    """The progress of a replay, in words."""
     late_ms = 1e3 * played.worst_late_s
-    return f"{played.frames} frames, {played.rate_hz:.1f} per second, at worst {late_ms:.1f} ms late"
+    return f"{played.frames} frames, {played.rate_hz:.1f} per second, the latest {late_ms:.1f} ms late"
 
 
 def take_frames(take: Take) -> Iterator[BodyFrame]:
-    """A take as the frames a tracker would have sent."""
+    """The frames that a tracker would have sent for a take."""
     tracks = {name: (track.poses.tolist(), track.tracked.tolist()) for name, track in take.bodies.items()}
     for k, t_s in enumerate(take.time_s.tolist()):
         bodies = [
@@ -95,9 +97,12 @@ def take_frames(take: Take) -> Iterator[BodyFrame]:
 
 
 def resample(take: Take, rate_hz: float) -> Take:
-    """The take at another rate, without its fingers: lerp, slerp; tracked where both neighbours are."""
+    """The take at another rate, without its fingers.
+
+    Positions are interpolated linearly and rotations spherically; a body is tracked where both neighbours are.
+    """
     if not RATES_HZ[0] <= rate_hz <= RATES_HZ[1]:
-        raise TakeError(f"--rate is {rate_hz}; allowed are {RATES_HZ[0]} to {RATES_HZ[1]} Hz")
+        raise TakeError(f"--rate is {rate_hz:g} Hz; allowed are {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz")
     begin_s, end_s = take.time_s[0], take.time_s[-1]
     time_s = begin_s + np.arange(int((end_s - begin_s) * rate_hz + 1e-6) + 1) / rate_hz
     before = np.clip(np.searchsorted(take.time_s, time_s, side="right") - 1, 0, max(len(take.time_s) - 2, 0))
@@ -117,7 +122,7 @@ def _between(track: BodyTrack, before: NDArray[np.intp], after: NDArray[np.intp]
 
 
 def _occasionally(show: Callable[[Played], None]) -> Callable[[Played], None]:
-    """Call `show` a few times a second: drawing must not make frames late."""
+    """Call `show` only a few times a second, because drawing must not delay frames."""
     shown_s = float("-inf")
 
     def shown(played: Played) -> None:

@@ -1,25 +1,26 @@
-"""Which of the bodies that were heard are wrists, by their names or else by how far they moved, and a rig of it."""
+"""Guesses which streamed bodies are wrists, by their names or else by how far they move, and writes a rig file."""
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
-from manipnet.config.settings import WRISTS, BodyKey, ConfigError
+from manipnet.common.options import ConfigError
+from manipnet.config.settings import WRISTS, BodyKey
 from manipnet.synthesis.objects.library import library_names
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 STEP_M: Final = 0.005
-"""Motion is counted in steps of this: a tracker's noise makes none."""
+"""Motion is counted in steps of this length, so that the noise of a tracker does not count."""
 MOVED_M: Final = 0.3
-"""A wrist that was waved has gone at least this far."""
+"""A wrist that was waved has moved at least this far."""
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _SIDES = {"left_wrist": {"left", "l", "lft"}, "right_wrist": {"right", "r", "rgt"}}
 _HANDS = {"wrist", "hand", "glove", "palm"}
-_ALSO_CALLED = {
+_SYNONYMS = {
     "box": "cube",
     "crate": "cube",
     "ball": "sphere",
@@ -30,96 +31,95 @@ _ALSO_CALLED = {
 
 
 @dataclass(slots=True)
-class HeardBody:
-    """One body of the stream: its key for a rig, and how far it went."""
+class StreamedBody:
+    """One body of the stream, and how far it has moved."""
 
     id: int | None
     name: str | None
     moved_m: float = 0.0
-    tracked: int = 0
     _anchor: np.ndarray | None = field(default=None, repr=False)
 
     @property
     def key(self) -> BodyKey:
-        """Its name, which people can read, else its id."""
+        """How a rig names it: by its name, which people can read, or else by its streaming id."""
         return self.name if self.name else self.id if self.id is not None else ""
 
     def add(self, sample: BodySample) -> None:
         """Take one sample."""
         if not sample.tracked:
             return
-        self.tracked += 1
         here = np.array(sample.p)
         step_m = 0.0 if self._anchor is None else float(np.linalg.norm(here - self._anchor))
         if self._anchor is None or step_m >= STEP_M:
             self._anchor, self.moved_m = here, self.moved_m + step_m
 
 
-class Listener:
-    """Takes frames as a sink, from any thread."""
+class BodyCollector:
+    """Collects the bodies of all frames; a sink for receivers."""
 
     def __init__(self) -> None:
-        self.bodies: dict[tuple[int | None, str | None], HeardBody] = {}
+        self.bodies: dict[tuple[int | None, str | None], StreamedBody] = {}
 
     def __call__(self, frame: BodyFrame) -> None:
+        """Take one frame."""
         for sample in frame.bodies:
-            self.bodies.setdefault((sample.id, sample.name), HeardBody(sample.id, sample.name)).add(sample)
+            self.bodies.setdefault((sample.id, sample.name), StreamedBody(sample.id, sample.name)).add(sample)
 
 
 @dataclass(frozen=True)
 class Guess:
-    """Who is who, and why: `wrists` by part."""
+    """The body of each wrist with the reason for it, and the bodies that are left."""
 
     wrists: dict[str, tuple[BodyKey, str]]
-    others: tuple[HeardBody, ...]
+    others: tuple[StreamedBody, ...]
 
 
-def guess(bodies: Sequence[HeardBody], said: dict[str, BodyKey]) -> Guess:
-    """Wrists as `said`, else by name, else the two that moved most, the right one more than the left.
+def guess(bodies: Sequence[StreamedBody], given: Mapping[str, BodyKey]) -> Guess:
+    """Find the wrists: those `given`, then those with a wrist's name, then the two bodies that moved most.
 
-    Raises `ConfigError` when there is no telling.
+    Of the latter, the one that moved more is the right wrist. Raises `ConfigError` if no wrist can be found.
     """
-    wrists: dict[str, tuple[BodyKey, str]] = {part: (key, "as said") for part, key in said.items()}
-    left = {body.key: body for body in bodies if body.key not in said.values()}
+    wrists: dict[str, tuple[BodyKey, str]] = {part: (key, "as given") for part, key in given.items()}
+    left = {body.key: body for body in bodies if body.key not in given.values()}
     for part in WRISTS:
-        named = [key for key, body in left.items() if _named(body.name, part)]
+        named = [key for key, body in left.items() if _is_named(body.name, part)]
         if part not in wrists and named:
             wrists[part] = named[0], "by its name"
             del left[named[0]]
     missing = [part for part in reversed(WRISTS) if part not in wrists]
     waved = sorted((body for body in left.values() if body.moved_m >= MOVED_M), key=lambda body: -body.moved_m)
     for part, body in zip(missing, waved, strict=False):
-        wrists[part] = body.key, f"it moved {body.moved_m:.1f} m: see that left and right are not swapped"
+        wrists[part] = body.key, f"it moved {body.moved_m:.1f} m; check that left and right are not swapped"
         del left[body.key]
     if not wrists:
-        heard = ", ".join(str(body.key) for body in bodies) or "none"
+        arrived = ", ".join(str(body.key) for body in bodies) or "none"
         raise ConfigError(
-            f"no body is a wrist by its name, and none was waved (heard: {heard}); wave both hands while it listens, "
-            "the right one more, or say --left-wrist BODY --right-wrist BODY"
+            f"no body has the name of a wrist, and none was waved (bodies that arrived: {arrived}); wave both hands "
+            "while this command listens, the right hand more, or give --left-wrist BODY and --right-wrist BODY"
         )
     return Guess({part: wrists[part] for part in WRISTS if part in wrists}, tuple(left.values()))
 
 
-def rig_of(found: Guess, server: dict[str, object]) -> str:
-    """The text of a rig file. Bodies nobody knows stay in it as comments."""
+def rig_of(found: Guess, server: Mapping[str, object]) -> str:
+    """The text of a rig file. Bodies for which no mesh is known are written as comments."""
     lines = ["# Written by `manipnet rig init`; see docs/rig.md.", "[bodies]"]
-    lines += [f"{part} = {_toml(key)}   # {why}" for part, (key, why) in found.wrists.items()]
+    lines += [f"{part} = {_toml(key)}   # {reason}" for part, (key, reason) in found.wrists.items()]
     for body in found.others:
         mesh = _mesh(body.name)
         lines += [
             "",
-            *(_object(body, mesh) if mesh else [f"# {line}" for line in _object(body, "mesh of your own.obj")]),
+            *(_object(body, mesh) if mesh else [f"# {line}" for line in _object(body, "your own mesh.obj")]),
         ]
     if server:
         lines += ["", "[server]", *(f"{key} = {_toml(value)}" for key, value in server.items())]
     return "\n".join(lines) + "\n"
 
 
-def _object(body: HeardBody, mesh: str) -> list[str]:
+def _object(body: StreamedBody, mesh: str) -> list[str]:
     return [
         "[[objects]]",
         f"body = {_toml(body.key)}",
-        f"mesh = {_toml(mesh)}   # a file beside this one, or of the library",
+        f"mesh = {_toml(mesh)}   # a file in this folder, or the name of a library object",
     ]
 
 
@@ -127,7 +127,7 @@ def _words(name: str | None) -> list[str]:
     return [word.lower() for word in _WORDS.findall(name or "")]
 
 
-def _named(name: str | None, part: str) -> bool:
+def _is_named(name: str | None, part: str) -> bool:
     words = set(_words(name))
     side = words & _SIDES[part]
     return bool(side and words & _HANDS) or (words in ({"left"}, {"right"}) and bool(side))
@@ -135,9 +135,9 @@ def _named(name: str | None, part: str) -> bool:
 
 def _mesh(name: str | None) -> str | None:
     words = _words(name)
-    spelt = "_".join(words)
-    known = [mesh for mesh in library_names() if mesh in spelt or mesh in words]
-    return known[0] if known else next((_ALSO_CALLED[word] for word in words if word in _ALSO_CALLED), None)
+    joined = "_".join(words)
+    known = [mesh for mesh in library_names() if mesh in joined or mesh in words]
+    return known[0] if known else next((_SYNONYMS[word] for word in words if word in _SYNONYMS), None)
 
 
 def _toml(value: object) -> str:

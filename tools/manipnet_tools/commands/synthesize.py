@@ -1,4 +1,4 @@
-"""`manipnet synthesize`: fingers for a take, offline, by the synthesis of the live server."""
+"""`manipnet synthesize`: fingers for a take, made offline by the synthesis of the live server."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,21 +7,20 @@ from typing import IO, Annotated, Any
 
 import numpy as np
 import tyro
-from rich.console import Console
 from rich.progress import Progress
 
 from manipnet.config.settings import WRISTS
 from manipnet.geometry import Array
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
-from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Synthesizer, hand_to_world
 from manipnet_tools.takes.meshes import MeshFile, named_files, recorded_meshes
-from manipnet_tools.takes.rigged import RigText, read_rig, read_staged
+from manipnet_tools.takes.rigged import RigText, read_rig, read_rigged
 from manipnet_tools.takes.rollout import Ticks, hand_inputs, roll_out, tick_take
 from manipnet_tools.takes.take import Take, TakeError
+from manipnet_tools.terminal import open_console
 
 
 @dataclass(frozen=True)
@@ -29,46 +28,47 @@ class SynthesizeOptions:
     """Write the fingers of both hands of a take to a file, in world coordinates at 60 Hz."""
 
     take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
-    """A take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
+    """The take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
     mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")]
-    """Objects of the take that are handled, each with its mesh in metres; without any, those a recording keeps, or
-    else the rig's."""
+    """An object that the hands touch, and its mesh in metres; may be given several times. By default the meshes in the
+    recording, or else those of the rig."""
     out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """The file to write, .npz."""
     model: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_MODEL
-    """A shipped bundle's name or a bundle folder."""
+    """The model: the name of a shipped bundle, or a bundle's folder."""
     look_ahead: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
-    """Seconds of the future the synthesis knows, 0 to 0.5; the rest it forecasts."""
+    """How much of the future the synthesis reads from the take, 0 to 0.5; it forecasts the rest."""
     rig: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The rig: whose bodies are what, calibrated; a recording made by a server, or with --rig, knows by itself."""
+    """The rig file that says which body is which, and how each is calibrated. A recording made beside a server, or with
+    --rig, needs none."""
     actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Who of a rig with several actors; the first by default."""
+    """The actor, if the rig has several; by default the first."""
 
 
 def run(options: SynthesizeOptions) -> None:
     """Synthesise and write. Raises `TakeError`, `ConfigError`, `MeshError`, `BundleError` and `OSError`."""
     if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
-        raise TakeError(f"look-ahead {options.look_ahead} s is outside 0 to {MAX_LOOK_AHEAD_S}")
+        raise TakeError(f"--look-ahead is {options.look_ahead:g} s; allowed are 0 to {MAX_LOOK_AHEAD_S:g}")
     if not options.out.absolute().parent.is_dir():
-        raise TakeError(f"--out {options.out}: its folder does not exist; make it first")
-    console = Console(stderr=True)
+        raise TakeError(f"--out {options.out}: its folder does not exist; create it first")
+    console = open_console()
     with console.status("loading take, meshes and model"):
         rig = read_rig(options.rig, options.actor)
-        staged = read_staged(options.take, rig)
-        take = staged.take
+        rigged = read_rigged(options.take, rig)
+        take = rigged.take
         shapes = read_shapes(options.mesh, take, options.take, rig)
         synthesizer = Synthesizer(load_bundle(options.model))
         ticks = tick_take(take, options.look_ahead)
     with Progress(console=console) as progress:
         task = progress.add_task(take.name, total=2 * len(ticks.time_s))
-        hands = synthesise(synthesizer, ticks, shapes, lambda n: progress.advance(task, n), staged.hand_scale)
+        hands = synthesise(synthesizer, ticks, shapes, lambda n: progress.advance(task, n), rigged.hand_scale)
     with options.out.open("wb") as file:
         write_arrays(file, ticks, shapes, hands)
     console.print(f"wrote {options.out}: {len(ticks.time_s)} frames at 60 Hz, both hands")
 
 
 def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands: dict[str, Array]) -> None:
-    """The file of `manipnet synthesize`: time, the arrays of `synthesise`, and every object's poses and mesh."""
+    """Write the result: `time`, the arrays of `synthesise`, and the poses and mesh of every object."""
     objects = [name for name in ticks.bodies if not name.endswith("_wrist")]
     arrays: dict[str, Any] = {"time": ticks.time_s, **hands, "objects": np.array(objects)}
     arrays["object_poses"] = np.stack([ticks.bodies[name].poses for name in objects])
@@ -80,7 +80,7 @@ def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands:
 
 
 def read_shapes(meshes: Sequence[str], take: Take, path: Path, rig: RigText | None = None) -> dict[str, Shape]:
-    """Shapes by body from `NAME=FILE`, or else those the recording at `path` keeps, or else the rig's.
+    """Shapes by body: of `meshes` (`NAME=FILE`), or else of the recording at `path`, or else of the rig.
 
     Raises `TakeError` and `MeshError`.
     """
@@ -92,21 +92,24 @@ def read_shapes(meshes: Sequence[str], take: Take, path: Path, rig: RigText | No
     if not files and rig is not None:
         files = {name: file for name, file in rig.meshes.items() if name in take.objects}
     if not files:
-        raise TakeError(f"no --mesh: at least one of {', '.join(take.objects) or 'none'} needs one")
+        objects = ", ".join(take.objects) or "there are none"
+        raise TakeError(f"no --mesh: at least one of the take's objects needs a mesh ({objects})")
     return {
         name: build_shape(_centred(file.load()) if take.box_centred else file.load()) for name, file in files.items()
     }
 
 
 def check_wrists(take: Take) -> None:
-    """Raise `TakeError` unless both wrists are there."""
+    """Raise `TakeError` unless the take has both wrists."""
     if missing := [wrist for wrist in WRISTS if wrist not in take.bodies]:
-        have = ", ".join(take.bodies) or "none"
-        raise TakeError(f"{take.name}: no body {' and no '.join(missing)}, only {have}; name the wrists' bodies so")
+        bodies = ", ".join(take.bodies) or "none"
+        raise TakeError(
+            f"{take.name}: no body {' and no '.join(missing)}; its bodies are {bodies}; rename them or give --rig"
+        )
 
 
 def _centred(mesh: ClosedMesh) -> ClosedMesh:
-    """The mesh with its origin in the centre of its bounding box."""
+    """The mesh with its origin at the centre of its bounding box."""
     centre = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
     return closed_mesh(mesh.vertices - centre, mesh.faces, mesh.name)
 
@@ -118,7 +121,10 @@ def synthesise(
     advance: Callable[[int], None],
     hand_scale: float = 1.0,
 ) -> dict[str, Array]:
-    """The arrays of the file: world positions, rotations, distances and positions before inverse kinematics."""
+    """World positions, rotations, distances and positions before inverse kinematics, named as in the file.
+
+    Calls `advance` with the number of hand-ticks done since the last call.
+    """
     inputs = hand_inputs(ticks, shapes, hand_scale)
     arrays: dict[str, Array] = {}
     for side, motion in zip(inputs, roll_out(synthesizer, list(inputs.values()), advance), strict=True):

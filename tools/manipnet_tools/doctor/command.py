@@ -1,8 +1,7 @@
-"""`manipnet doctor`: why nothing arrives. Listens where the server would, or asks the server that already does."""
+"""`manipnet doctor`: says why no bodies arrive. It asks the running server, or else listens in its place."""
 
 import argparse
 import errno
-import json
 import logging
 import os
 import sys
@@ -12,77 +11,78 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import zmq
-
-from manipnet.config.rig_reader import load_rig
+from manipnet.common.options import ConfigError, Option
+from manipnet.config.flags import add_flags, read_flags
+from manipnet.config.rig_reader import Rig, load_rig
 from manipnet.config.settings import (
     WRISTS,
     ActorConfig,
     BodyKey,
-    ConfigError,
     ServerConfig,
+    all_options,
     default_actor,
-    parse_endpoint,
+    input_options,
+    server_config,
 )
-from manipnet.inputs.natnet.client import NatNetBodies
-from manipnet.inputs.natnet.protocol import COMMAND_PORT
-from manipnet.inputs.osc.receiver import OscBodies
-from manipnet.inputs.zeromq import ZmqBodies
-from manipnet.net.curve_keys import KeyFileError, read_client_keys
+from manipnet.control.client import ControlClient
+from manipnet.control.request import RequestError
+from manipnet.inputs import make_receivers
+from manipnet.inputs.declaration import Input
+from manipnet.net.curve_keys import KeyFileError
 from manipnet.net.errors import ListenError
-from manipnet.net.zap import secure_client
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
-from manipnet_tools.doctor import from_status as self_report
-from manipnet_tools.doctor import other_interfaces as elsewhere
-from manipnet_tools.doctor.diagnosis import Finding, Heard, SourceHeard, diagnose
+from manipnet_tools.doctor import other_interfaces
+from manipnet_tools.doctor.diagnosis import Finding, SourceTraffic, Traffic, diagnose
+from manipnet_tools.doctor.from_status import of_receivers, of_server
 
 ANSWER_S = 2.0
 MAX_SOURCES = 32
+MAX_LOG_LINES = 20
 
 
-class Listener(logging.Handler):
-    """Takes frames as a sink and complaints as a log handler, from any thread."""
+class TrafficMonitor(logging.Handler):
+    """Collects frames, as a sink, and the receivers' log lines, as a log handler. From any thread."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._news = threading.Lock()
-        self.sources: dict[str, SourceHeard] = {}
-        self.complaints: list[str] = []
+        self._lock = threading.Lock()
+        self.sources: dict[str, SourceTraffic] = {}
+        self.log: list[str] = []
 
     def __call__(self, frame: BodyFrame) -> None:
-        with self._news:
+        """Take one frame."""
+        with self._lock:
             if frame.source in self.sources or len(self.sources) < MAX_SOURCES:
-                self.sources.setdefault(frame.source, SourceHeard()).add(frame)
+                self.sources.setdefault(frame.source, SourceTraffic()).add(frame)
 
     def emit(self, record: logging.LogRecord) -> None:
-        self.complaints = [*self.complaints[-19:], record.getMessage()]
+        """Take one log line."""
+        self.log = [*self.log[1 - MAX_LOG_LINES :], record.getMessage()]
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The options of `manipnet doctor`; the addresses default to the server's."""
-    defaults = ServerConfig(())
-    parser = argparse.ArgumentParser(prog="manipnet doctor", description="Say why no tracked bodies arrive.")
-    parser.add_argument("--rig", type=Path, metavar="FILE", help="the rig file the server is to be started with")
-    parser.add_argument("--host", default=defaults.host, metavar="ADDRESS", help="address to listen on (%(default)s)")
-    parser.add_argument("--input-port", type=int, default=defaults.input_port, metavar="PORT", help="(%(default)s)")
-    parser.add_argument("--osc-port", type=int, default=defaults.osc_port, metavar="PORT", help="(%(default)s)")
-    parser.add_argument("--control-port", type=int, default=defaults.control_port, metavar="PORT", help="(%(default)s)")
-    parser.add_argument("--natnet", metavar="SERVER[:1510]", help="also connect to OptiTrack Motive there")
-    parser.add_argument("--multicast", action="store_true", help="Motive streams by multicast")
-    parser.add_argument("--interface", metavar="ADDRESS", help="address of the network card that faces Motive")
-    parser.add_argument("--key", type=Path, metavar="FILE", help="a client's keys, to ask a server that wants some")
-    parser.add_argument("--seconds", type=float, default=5.0, help="how long to listen (%(default)s)")
+    """The options of `manipnet doctor`; those of the server have the server's defaults."""
+    parser = argparse.ArgumentParser(
+        prog="manipnet doctor",
+        usage="manipnet doctor [options]",
+        description="Say why no tracked bodies arrive, and what to do. Asks the server that runs on this machine; "
+        "without one, listens where it would listen.",
+    )
+    parser.add_argument("--rig", type=Path, metavar="FILE", help="the rig file of the server, to compare bodies with")
+    add_flags(parser, _server_options())
+    parser.add_argument("--key", type=Path, metavar="FILE", help="a client's key file, for a server with --keys")
+    parser.add_argument("--seconds", type=float, default=5.0, help="how long to listen (default: %(default)s)")
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Print what was found; the exit status: 0 when all is well, 1 when something is not."""
+    """Print what was found. The exit status is 0 if there is no problem, and 1 if there is one."""
     options = build_parser().parse_args(argv)
     try:
         findings = examine(options)
     except (ConfigError, KeyFileError) as error:
-        findings = [Finding("problem", str(error), "mend the file or the option")]
+        findings = [Finding("problem", str(error), "correct the file or the option")]
     for finding in findings:
         print(f"{finding.level:8}{finding.text}")
         if finding.remedy:
@@ -91,51 +91,40 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def examine(options: argparse.Namespace) -> list[Finding]:
-    """Listen or ask, and reason about it; raises `ConfigError` for a wrong rig file or option."""
-    actors = load_rig(options.rig).actors if options.rig is not None else (default_actor(),)
-    running = ask_status(options.host, options.control_port, options.key)
-    if running is not None:
-        return self_report.of_server(running, f"{options.host}:{options.control_port}")
-    listener, telemetry = Listener(), Telemetry()
+    """Ask the server, or listen in its place, and diagnose. Raises `ConfigError` and `KeyFileError`."""
+    rig = Rig((default_actor(),)) if options.rig is None else load_rig(options.rig)
+    config = server_config(rig.actors, rig.server | read_flags(options, _server_options()))
+    status = ask_status(config.host, config.control_port, options.key)
+    if status is not None:
+        return of_server(status, f"{config.host}:{config.control_port}")
+    return listen_and_diagnose(config, options.seconds)
+
+
+def listen_and_diagnose(config: ServerConfig, seconds: float) -> list[Finding]:
+    """Start the server's receivers for some seconds, and diagnose what arrives."""
+    monitor, telemetry = TrafficMonitor(), Telemetry()
     log = logging.getLogger("manipnet.inputs")
     findings: list[Finding] = []
-    addresses: dict[str, str] = {}
-    receivers, motive = _receivers(options, listener, telemetry)
+    addresses: list[str] = []
+    receivers = make_receivers(config.of, monitor, telemetry, config.host)
     with ExitStack() as opened:
-        log.addHandler(listener)
-        opened.callback(log.removeHandler, listener)
-        for what, receiver in receivers.items():
+        log.addHandler(monitor)
+        opened.callback(log.removeHandler, monitor)
+        for receiver in receivers.values():
             try:
                 receiver.start()
             except ListenError as error:
                 findings.append(_cannot_listen(error))
             else:
                 opened.callback(receiver.stop)
-                addresses[what] = receiver.address
-                findings.append(Finding("ok", f"listening for {options.seconds:g} s on {receiver.address}"))
-        others = set() if options.host in ("0.0.0.0", "::") else elsewhere.own_addresses() - {options.host}
-        beside = elsewhere.OtherInterfaces(sorted(others), options.osc_port, options.input_port)
-        listen(options.seconds)
-        findings += _elsewhere(options.host, beside.heard())
-        if motive is not None:
-            findings += self_report.of_motive(motive.status())
-    heard = Heard(listener.sources, telemetry.counts().get("frames_dropped", {}), listener.complaints)
-    return findings + diagnose(heard, expected_parts(actors), addresses)
-
-
-def _receivers(
-    options: argparse.Namespace, listener: Listener, telemetry: Telemetry
-) -> tuple[dict[str, Any], NatNetBodies | None]:
-    """Everything that would receive bodies in the server, and the one of NatNet if it is asked for."""
-    receivers: dict[str, Any] = {
-        "bodies": ZmqBodies(listener, telemetry, options.host, options.input_port),
-        "osc": OscBodies(listener, telemetry, options.host, options.osc_port),
-    }
-    if options.natnet is None:
-        return receivers, None
-    host, port = parse_endpoint(options.natnet, COMMAND_PORT)
-    motive = NatNetBodies(listener, telemetry, host, port, multicast=options.multicast, interface=options.interface)
-    return {**receivers, "natnet": motive}, motive
+                addresses.append(receiver.address)
+                findings.append(Finding("ok", f"listening for {seconds:g} s on {receiver.address}"))
+        beside = _other_interfaces(config, receivers)
+        listen(seconds)
+        findings += _wrong_addresses(config.host, beside.counts())
+        findings += of_receivers({declared.title: receiver.status() for declared, receiver in receivers.items()})
+    traffic = Traffic(monitor.sources, telemetry.counts().get("frames_dropped", {}), monitor.log)
+    return findings + diagnose(traffic, expected_parts(config.actors), addresses)
 
 
 def listen(seconds: float) -> None:
@@ -144,7 +133,7 @@ def listen(seconds: float) -> None:
 
 
 def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
-    """Which body each wrist and prop of the actors is."""
+    """The body of each wrist and prop of the actors."""
     parts: dict[str, BodyKey] = {}
     for actor in actors:
         prefix = f"{actor.name}: " if len(actors) > 1 else ""
@@ -154,41 +143,50 @@ def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
 
 
 def ask_status(host: str, port: int, key: Path | None = None) -> dict[str, Any] | None:
-    """The `status` of the server that runs there; None when none answers. Raises `KeyFileError`."""
-    with zmq.Context() as context, context.socket(zmq.REQ) as request:
-        request.setsockopt(zmq.LINGER, 0)
-        if key is not None:
-            secure_client(request, read_client_keys(key))
-        request.connect(f"tcp://{host}:{port}")
-        request.send(b'{"op": "status"}')
-        if not request.poll(int(1e3 * ANSWER_S)):
-            return None
-        try:
-            answer = json.loads(request.recv())
-        except ValueError:
-            return None
-    return answer if isinstance(answer, dict) and "counters" in answer else None
+    """The `status` of the server that runs there, or None if none answers. Raises `KeyFileError`."""
+    address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    try:
+        answer = ControlClient(address, key, ANSWER_S).ask("status")
+    except (OSError, RequestError):
+        return None
+    return answer if "counters" in answer else None
+
+
+def _server_options() -> list[Option]:
+    options = all_options()
+    return [options["host"], options["control_port"], *input_options()]
+
+
+def _other_interfaces(config: ServerConfig, receivers: Mapping[Input, Any]) -> other_interfaces.OtherInterfaces:
+    everywhere = config.host in ("0.0.0.0", "::")
+    addresses = set() if everywhere else other_interfaces.own_addresses() - {config.host}
+    ports = [
+        (declared.transport, getattr(config.of(declared.options), declared.where.field))
+        for declared in receivers
+        if declared.transport is not None
+    ]
+    return other_interfaces.OtherInterfaces(sorted(addresses), ports)
 
 
 def _cannot_listen(error: ListenError) -> Finding:
     text = str(error)
     if os.strerror(errno.EADDRINUSE) in text:
-        remedy = "see who has the port: `ss -lntup`, on Windows `netstat -ano`"
+        remedy = "see which program has the port: `ss -lntup`, on Windows `netstat -ano`"
     elif os.strerror(errno.EADDRNOTAVAIL) in text:
-        remedy = f"name an address of this machine: {', '.join(sorted(elsewhere.own_addresses()))}"
+        remedy = f"name an address of this machine: {', '.join(sorted(other_interfaces.own_addresses()))}"
     else:
-        remedy = "mend the address or the port"
+        remedy = "correct the address or the port"
     return Finding("problem", text, remedy)
 
 
-def _elsewhere(host: str, heard: Mapping[str, int]) -> list[Finding]:
+def _wrong_addresses(host: str, counts: Mapping[str, int]) -> list[Finding]:
     return [
         Finding(
             "problem",
-            f"{count} packets or connections came to {where}, but the server is to listen on {host}",
+            f"{count} packets or connections came to {where}, but the server listens on {host}",
             f"send to {host}, or start the server with --host {where.rpartition(':')[0]} (and --keys and --allow)",
         )
-        for where, count in heard.items()
+        for where, count in counts.items()
     ]
 
 

@@ -1,38 +1,42 @@
-"""What arrives at this machine's other addresses while the server listens at one: the usual wrong interface."""
+"""Counts what arrives at other addresses of this machine: senders often send to the wrong one."""
 
 import contextlib
 import socket
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, Literal
 
 from manipnet.net.errors import ListenError
 from manipnet.net.udp import local_address_towards
 
-SOMEWHERE: Final = "192.0.2.1"
-"""An address of no machine (RFC 5737), to learn through which card this one would leave."""
+ELSEWHERE: Final = "192.0.2.1"
+"""An address that no machine has (RFC 5737), to find the network card for destinations elsewhere."""
+MOST_COUNTED: Final = 10_000
+
+Port = tuple[Literal["tcp", "udp"], int]
 
 
 def own_addresses() -> set[str]:
-    """The IPv4 addresses of this machine that can be found without asking it to send anything."""
+    """The IPv4 addresses of this machine, as far as they can be found without sending anything."""
     found = {"127.0.0.1"}
     with contextlib.suppress(OSError):
         found |= {str(info[4][0]) for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
     with contextlib.suppress(ListenError):
-        found.add(local_address_towards(SOMEWHERE, 9))
+        found.add(local_address_towards(ELSEWHERE, 9))
     return found
 
 
 class OtherInterfaces:
-    """Counts, without reading, what comes to ports of other addresses than the one that is listened on."""
+    """Listens at some ports of `addresses`, and counts what arrives there without reading it."""
 
-    def __init__(self, addresses: Iterable[str], udp_port: int, tcp_port: int) -> None:
+    def __init__(self, addresses: Iterable[str], ports: Iterable[Port]) -> None:
         self._sockets: list[socket.socket] = []
+        ports = list(ports)
         for address in addresses:
-            self._open(socket.SOCK_DGRAM, address, udp_port)
-            self._open(socket.SOCK_STREAM, address, tcp_port)
+            for transport, port in ports:
+                self._open(transport, address, port)
 
-    def heard(self) -> dict[str, int]:
-        """Datagrams and connections by `address:port`, only where there were any; closes everything."""
+    def counts(self) -> dict[str, int]:
+        """Datagrams and connections by `address:port`, where there were any. Closes everything."""
         counts = {}
         for each in self._sockets:
             host, port = each.getsockname()
@@ -41,14 +45,14 @@ class OtherInterfaces:
             each.close()
         return counts
 
-    def _open(self, kind: socket.SocketKind, address: str, port: int) -> None:
-        made = socket.socket(socket.AF_INET, kind)
+    def _open(self, transport: Literal["tcp", "udp"], address: str, port: int) -> None:
+        made = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == "tcp" else socket.SOCK_DGRAM)
         try:
             made.bind((address, port))
             made.setblocking(False)
-            if kind == socket.SOCK_STREAM:
+            if transport == "tcp":
                 made.listen()
-        except OSError:  # somebody else has it: nothing can be learned there
+        except OSError:  # another program listens there, so nothing can be learned
             made.close()
         else:
             self._sockets.append(made)
@@ -57,7 +61,7 @@ class OtherInterfaces:
 def _drain(made: socket.socket) -> int:
     count = 0
     with contextlib.suppress(OSError):
-        while count < 10_000:
+        while count < MOST_COUNTED:
             if made.type == socket.SOCK_DGRAM:
                 made.recv(1)
             else:

@@ -19,7 +19,7 @@ from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
 
 TICK_HZ = 60.0
 PAUSE_S = 10.0
-"""A recording whose sender's time jumps back, or on by more than this, goes on with another performance."""
+"""A recording whose sender's time jumps back, or on by more than this, goes on with another animation."""
 _BONE_PARENTS = PARENTS[1:BONE_COUNT]
 
 
@@ -69,7 +69,7 @@ class Animation:
     """Of those objects whose shape is known."""
 
 
-def read_performance(path: Path, actor: str | None = None) -> Animation:
+def read_animation(path: Path, actor: str | None = None) -> Animation:
     """Fingers from a recording (of one `actor`, the first by default), the file of `manipnet synthesize`, or a take.
 
     Raises `ExportError`, `TakeError`, `RecordingError` and `MeshError`.
@@ -184,9 +184,9 @@ def _recorded_body(frames: list[HandsMessage | None], name: str) -> BodyTrack:
     return BodyTrack(poses, np.array([body is not None and body.tracked for body in bodies]))
 
 
-def with_meshes(performance: Animation, meshes: Mapping[str, ClosedMesh]) -> Animation:
+def with_meshes(animation: Animation, meshes: Mapping[str, ClosedMesh]) -> Animation:
     """The same with these `meshes` instead of those it knew. Raises `ExportError` for an object it does not have."""
-    if unknown := meshes.keys() - performance.objects.keys():
-        have = ", ".join(performance.objects) or "none"
-        raise ExportError(f"--mesh {min(unknown)}=…: {performance.name} has the objects {have}")
-    return replace(performance, meshes=performance.meshes | dict(meshes))
+    if unknown := meshes.keys() - animation.objects.keys():
+        have = ", ".join(animation.objects) or "none"
+        raise ExportError(f"--mesh {min(unknown)}=…: {animation.name} has the objects {have}")
+    return replace(animation, meshes=animation.meshes | dict(meshes))

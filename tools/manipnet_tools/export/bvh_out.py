@@ -16,7 +16,7 @@ _CHANNELS = "Yrotation Xrotation Zrotation"
 _ROOT_CHANNELS = f"CHANNELS 6 Xposition Yposition Zposition {_CHANNELS}"
 
 
-def write_bvh(performance: Animation, folder: Path, right_handed: bool = False) -> list[Path]:
+def write_bvh(animation: Animation, folder: Path, right_handed: bool = False) -> list[Path]:
     """Write `leftHand.bvh`, `rightHand.bvh` and `<object>.bvh` into `folder`; returns the files.
 
     As the dataset's own files they are left-handed decimetres, which every tool here reads; `right_handed` ones are
@@ -26,9 +26,9 @@ def write_bvh(performance: Animation, folder: Path, right_handed: bool = False) 
         raise ExportError(f"{folder}: holds BVH files already, which may be a take; give a new folder")
     folder.mkdir(parents=True, exist_ok=True)
     space = _Space(CENTIMETRES_PER_M, False) if right_handed else _Space(DECIMETRES_PER_M, True)
-    texts = {f"{side}Hand": _hand_text(hand, performance.rate_hz, space) for side, hand in performance.hands.items()}
-    for name, body in performance.objects.items():
-        texts[file_stem(name)] = _object_text(file_stem(name), body.poses, performance.rate_hz, space)
+    texts = {f"{side}Hand": _hand_text(hand, animation.rate_hz, space) for side, hand in animation.hands.items()}
+    for name, body in animation.objects.items():
+        texts[file_stem(name)] = _object_text(file_stem(name), body.poses, animation.rate_hz, space)
     for stem, text in texts.items():
         (folder / f"{stem}.bvh").write_text(text, encoding="utf-8")
     return [folder / f"{stem}.bvh" for stem in texts]

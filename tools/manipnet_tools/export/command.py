@@ -1,18 +1,18 @@
-"""`manipnet export`: fingers and objects for other programs."""
+"""`manipnet export`: writes hands and objects for other programs."""
 
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from rich.console import Console
 
 from manipnet.synthesis.objects.mesh import load_mesh
-from manipnet_tools.export.animation import Animation, ExportError, read_performance, with_meshes
+from manipnet_tools.export.animation import Animation, ExportError, read_animation, with_meshes
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf
 from manipnet_tools.takes.meshes import named_files
+from manipnet_tools.terminal import open_console
 
 SUFFIXES = {"gltf": (".glb", ".gltf"), "csv": (".csv",)}
 
@@ -28,35 +28,38 @@ class ExportOptions:
     source: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RECORDING|NPZ|TAKE")]
     """A recording with hands, a file of `manipnet synthesize`, or a captured take (folder of BVH files)."""
     format: Literal["bvh", "gltf", "csv"]
-    """What to write."""
+    """The format to write."""
     out: Annotated[Path, tyro.conf.arg(metavar="PATH")]
-    """The file to write (.glb, .gltf or .csv); for bvh a folder."""
+    """The file to write (.glb, .gltf or .csv), or for bvh the folder."""
     mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")] = ()
-    """gltf: the mesh of an object, in metres, where the source does not know it."""
+    """gltf: the mesh of an object, in metres, if the source does not hold it; may be given several times."""
     actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Whose hands, where a recording has several actors; the first one's by default."""
+    """The actor whose hands to write, if a recording has several; by default the first."""
     right_handed: bool = False
-    """bvh: right-handed centimetres, for Blender and Maya, instead of the dataset's left-handed decimetres."""
+    """bvh: write right-handed centimetres, for Blender and Maya, instead of the dataset's left-handed decimetres."""
 
 
 def run(options: ExportOptions) -> None:
-    """Read, write, say what. Raises `ExportError`, `TakeError`, `RecordingError`, `MeshError` and `OSError`."""
+    """Read the source, write the files and print what they hold.
+
+    Raises `ExportError`, `TakeError`, `RecordingError`, `MeshError` and `OSError`.
+    """
     check(options)
-    console = Console(stderr=True)
+    console = open_console()
     with console.status(f"reading {options.source}"):
-        performance = read_performance(options.source, options.actor)
-        files = named_files(options.mesh, performance.objects)
-        performance = with_meshes(performance, {name: load_mesh(file, name=name) for name, file in files.items()})
+        animation = read_animation(options.source, options.actor)
+        files = named_files(options.mesh, animation.objects)
+        animation = with_meshes(animation, {name: load_mesh(file, name=name) for name, file in files.items()})
     with console.status(f"writing {options.out}"):
         if options.format == "bvh":
-            write_bvh(performance, options.out, options.right_handed)
+            write_bvh(animation, options.out, options.right_handed)
         elif options.format == "gltf":
-            write_gltf(performance, options.out)
+            write_gltf(animation, options.out)
         else:
-            write_csv(performance, options.out)
-    console.print(f"wrote {options.out}: {summary(performance)}", soft_wrap=True)
-    if options.format == "gltf" and (bare := performance.objects.keys() - performance.meshes.keys()):
-        console.print(f"without a mesh, so not to be seen: {', '.join(sorted(bare))} (--mesh NAME=FILE)")
+            write_csv(animation, options.out)
+    console.print(f"wrote {options.out}: {summary(animation)}")
+    if options.format == "gltf" and (bare := animation.objects.keys() - animation.meshes.keys()):
+        console.print(f"not in the file because they have no mesh (--mesh NAME=FILE): {', '.join(sorted(bare))}")
 
 
 def check(options: ExportOptions) -> None:
@@ -65,16 +68,16 @@ def check(options: ExportOptions) -> None:
     if suffixes and options.out.suffix.lower() not in suffixes:
         raise ExportError(f"--out {options.out}: for --format {options.format} it must end in {' or '.join(suffixes)}")
     if options.right_handed and options.format != "bvh":
-        raise ExportError(f"--right-handed is for bvh; {options.format} is right-handed anyway")
+        raise ExportError(f"--right-handed is for --format bvh only; {options.format} is always right-handed")
     if not options.out.absolute().parent.is_dir():
-        raise ExportError(f"--out {options.out}: its folder does not exist; make it first")
+        raise ExportError(f"--out {options.out}: its folder does not exist; create it first")
 
 
-def summary(performance: Animation) -> str:
-    """What a performance holds, in words."""
-    seconds = len(performance.time_s) / performance.rate_hz
-    hands = " and ".join(performance.hands)
-    objects = f", objects {', '.join(performance.objects)}" if performance.objects else ""
-    held = {side: (~hand.live).sum() for side, hand in performance.hands.items()}
+def summary(animation: Animation) -> str:
+    """What an animation holds, in words."""
+    seconds = len(animation.time_s) / animation.rate_hz
+    hands = " and ".join(animation.hands)
+    objects = f", objects {', '.join(animation.objects)}" if animation.objects else ""
+    held = {side: (~hand.live).sum() for side, hand in animation.hands.items()}
     lost = "".join(f"; {side} held or at rest in {count} frames" for side, count in held.items() if count)
-    return f"{len(performance.time_s)} frames at {performance.rate_hz:g} Hz ({seconds:.1f} s), {hands}{objects}{lost}"
+    return f"{len(animation.time_s)} frames at {animation.rate_hz:g} Hz ({seconds:.1f} s), {hands}{objects}{lost}"

@@ -14,12 +14,12 @@ from manipnet_tools.export.animation import Animation, HandTrack
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
-def write_csv(performance: Animation, path: Path) -> None:
+def write_csv(animation: Animation, path: Path) -> None:
     """Write the table; right-handed, Y up, metres, radians, seconds. Raises `OSError`."""
-    columns: dict[str, Array] = {"time_s": performance.time_s}
-    for side, hand in performance.hands.items():
+    columns: dict[str, Array] = {"time_s": animation.time_s}
+    for side, hand in animation.hands.items():
         columns |= _hand_columns(side, hand)
-    for name, body in performance.objects.items():
+    for name, body in animation.objects.items():
         columns |= {f"{name}_{part}": body.poses[:, k] for k, part in enumerate(_POSE)}
         columns[f"{name}_tracked"] = body.tracked.astype(np.float64)
     with path.open("w", newline="", encoding="utf-8") as file:

@@ -26,28 +26,28 @@ from manipnet_tools.rendering import CERAMIC, SKIN_LEFT, SKIN_RIGHT, corner_norm
 _COLOURS: Mapping[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right": SKIN_RIGHT}
 
 
-def write_gltf(performance: Animation, path: Path) -> None:
+def write_gltf(animation: Animation, path: Path) -> None:
     """Write `.glb` or `.gltf`. Raises `OSError`."""
-    scene = _Scene(performance)
-    for side, hand in performance.hands.items():
+    scene = _Scene(animation)
+    for side, hand in animation.hands.items():
         scene.add_hand(side, hand)
-    for name, body in performance.objects.items():
-        scene.add_object(name, body.poses, performance.meshes.get(name))
+    for name, body in animation.objects.items():
+        scene.add_object(name, body.poses, animation.meshes.get(name))
     scene.save(path)
 
 
 class _Scene:
     """A document that grows node by node."""
 
-    def __init__(self, performance: Animation) -> None:
+    def __init__(self, animation: Animation) -> None:
         self._buffer = Buffer()
         self._document: dict[str, list[Any]] = {"nodes": [], "meshes": [], "materials": []}
         self._skins: list[Any] = []
         self._roots: list[int] = []
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
-        self._name = performance.name
-        time_s = (performance.time_s - performance.time_s[0]).astype(np.float32)
+        self._name = animation.name
+        time_s = (animation.time_s - animation.time_s[0]).astype(np.float32)
         self._times = self._buffer.add(time_s, bounds=True)
 
     def add_hand(self, side: Side, hand: HandTrack) -> None:

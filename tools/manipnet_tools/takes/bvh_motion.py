@@ -1,4 +1,4 @@
-"""Motion files in BVH: a generic reader that loses nothing, without any convention of one data set."""
+"""Reads motion files in BVH without loss, and without the conventions of any dataset."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +15,7 @@ _CHANNELS = {f"{axis}{kind}" for axis in _AXES for kind in ("position", "rotatio
 
 
 class BvhError(ValueError):
-    """A BVH file that cannot be read; the text names the file, the place and what was expected."""
+    """A BVH file cannot be read; the text names the file, the place and what was expected."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Bvh:
     motion: Array
 
     def local_transforms(self) -> tuple[Array, Array]:
-        """Translations `(T, J, 3)` (offset plus position) and rotations `(T, J, 4)`, each in its parent."""
+        """Translations `(T, J, 3)` (offset plus position) and rotations `(T, J, 4)`, each relative to its parent."""
         frames = len(self.motion)
         translations = np.tile(np.array([joint.offset for joint in self.joints], dtype=np.float64), (frames, 1, 1))
         rotations = np.tile([0.0, 0.0, 0.0, 1.0], (frames, len(self.joints), 1))
@@ -59,7 +59,7 @@ def read_bvh(path: Path | str) -> Bvh:
     try:
         header, marker, motion = path.read_text(encoding="utf-8", errors="replace").partition("MOTION")
         if not marker:
-            raise BvhError("no MOTION section")
+            raise BvhError("has no MOTION section")
         joints = _parse_hierarchy(header.split())
         frame_time_s, values = _parse_motion(motion, sum(len(joint.channels) for joint in joints))
     except BvhError as error:
@@ -69,9 +69,9 @@ def read_bvh(path: Path | str) -> Bvh:
 
 def _parse_hierarchy(tokens: list[str]) -> tuple[Joint, ...]:
     if tokens[:2] != ["HIERARCHY", "ROOT"]:
-        raise BvhError("must start with HIERARCHY and one ROOT joint")
+        raise BvhError("the file must start with HIERARCHY and one ROOT joint")
     joints: list[Joint] = []
-    stack: list[int] = []  # open braces: the joint each one belongs to, -1 inside an End Site
+    stack: list[int] = []  # the joint of each open brace, -1 inside an End Site
     at = 1
     try:
         while at < len(tokens):
@@ -79,7 +79,9 @@ def _parse_hierarchy(tokens: list[str]) -> tuple[Joint, ...]:
             if word in ("ROOT", "JOINT"):
                 parent = stack[-1] if stack else -1
                 if (word == "ROOT") != (not stack) or (word == "ROOT" and joints):
-                    raise BvhError(f"unexpected {word} {tokens[at + 1]!r}: one ROOT, JOINTs inside it")
+                    raise BvhError(
+                        f"unexpected {word} {tokens[at + 1]!r}; a hierarchy is one ROOT with JOINTs inside it"
+                    )
                 joints.append(Joint(tokens[at + 1], parent, (0.0, 0.0, 0.0), ()))
                 stack.append(len(joints) - 1)
                 at += 3
@@ -95,7 +97,7 @@ def _parse_hierarchy(tokens: list[str]) -> tuple[Joint, ...]:
                 count = int(tokens[at + 1])
                 channels = tuple(tokens[at + 2 : at + 2 + count])
                 if not set(channels) <= _CHANNELS:
-                    raise BvhError(f"channels {' '.join(channels)}: allowed are {sorted(_CHANNELS)}")
+                    raise BvhError(f"channels are {' '.join(channels)}; allowed are {', '.join(sorted(_CHANNELS))}")
                 joints[stack[-1]] = replace(joints[stack[-1]], channels=channels)
                 at += 2 + count
             elif word == "}":
@@ -106,7 +108,7 @@ def _parse_hierarchy(tokens: list[str]) -> tuple[Joint, ...]:
     except (IndexError, ValueError) as error:
         if isinstance(error, BvhError):
             raise
-        raise BvhError(f"hierarchy breaks off or holds a bad number near word {at}: {error}") from None
+        raise BvhError(f"the hierarchy is cut off or has a bad number near word {at}: {error}") from None
     if stack:
         raise BvhError("a brace of the hierarchy is not closed")
     return tuple(joints)
@@ -119,15 +121,17 @@ def _parse_motion(text: str, columns: int) -> tuple[float, Array]:
         # One pass over one list is 20 times faster than a conversion per line.
         frame_time_s, *values = map(float, body.split())
     except ValueError as error:
-        raise BvhError(f"MOTION section must read 'Frames: N', 'Frame Time: S', then numbers only ({error})") from None
+        raise BvhError(
+            f"the MOTION section must read 'Frames: N', 'Frame Time: S', and then only numbers ({error})"
+        ) from None
     motion = np.array(values)
     if motion.size != frames * columns or not frames:
-        raise BvhError(f"{frames} frames of {columns} channels announced, {motion.size} numbers found")
+        raise BvhError(f"the file announces {frames} frames of {columns} channels but has {motion.size} numbers")
     if not np.isfinite(motion).all():
         row = int(np.argwhere(~np.isfinite(motion))[0, 0]) // columns
-        raise BvhError(f"frame {row} holds a number that is not finite")
+        raise BvhError(f"frame {row} has a number that is not finite")
     if not 1e-4 <= frame_time_s <= 10.0:
-        raise BvhError(f"frame time {frame_time_s} s is outside 0.0001 to 10")
+        raise BvhError(f"the frame time is {frame_time_s} s; allowed are 0.0001 to 10")
     return frame_time_s, motion.reshape(frames, columns)
 
 

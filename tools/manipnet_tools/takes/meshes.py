@@ -1,4 +1,4 @@
-"""Meshes of a take's objects: those named on the command line or in a rig, and those a recording keeps."""
+"""Meshes of a take's objects: those named on the command line or in a rig, and those in a recording."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from manipnet_tools.takes.take import TakeError
 
 @dataclass(frozen=True)
 class MeshFile:
-    """A mesh file, and how it is read."""
+    """A mesh file with its unit and scale."""
 
     path: Path
     unit: str = "m"
@@ -23,20 +23,26 @@ class MeshFile:
         return load_mesh(self.path, self.unit, self.scale)
 
 
-def named_files(texts: Sequence[str], names: Iterable[str]) -> dict[str, Path]:
-    """Files by object from `NAME=FILE`, NAME one of `names`. Raises `TakeError`."""
-    names = tuple(names)
-    files = {}
+def named_files(texts: Sequence[str], names: Iterable[str] | None = None) -> dict[str, Path]:
+    """Files by name from the options `--mesh NAME=FILE`, where NAME must be one of `names` if they are given.
+
+    Raises `TakeError`.
+    """
+    files: dict[str, Path] = {}
     for text in texts:
-        name, equals, file = text.partition("=")
-        if not equals or name not in names:
-            raise TakeError(f"--mesh {text}: must be NAME=FILE with NAME one of {', '.join(names) or 'none'}")
+        name, _, file = text.partition("=")
+        if not (name and file):
+            raise TakeError(f"--mesh {text}: must be NAME=FILE, for example Box=meshes/box.obj")
+        if names is not None and name not in names:
+            raise TakeError(
+                f"--mesh {text}: no object is called {name!r}; the objects are {', '.join(names) or 'none'}"
+            )
         files[name] = Path(file)
     return files
 
 
 def recorded_meshes(recording: Path) -> dict[str, ClosedMesh]:
-    """The meshes a recording keeps, by object. Raises `RecordingError`, and `MeshError` for a damaged one."""
+    """The meshes in a recording, by object. Raises `RecordingError`, and `MeshError` for a damaged mesh."""
     meshes = {}
     with TemporaryDirectory() as folder:
         for name, content in read_about(recording).meshes.items():
@@ -46,5 +52,7 @@ def recorded_meshes(recording: Path) -> dict[str, ClosedMesh]:
                 meshes[file.stem] = load_mesh(file)
             except MeshError as error:
                 reason = str(error).removeprefix(f"{file}: ")
-                raise MeshError(f"{recording}: its mesh {name}: {reason}; give --mesh {file.stem}=FILE") from None
+                raise MeshError(
+                    f"{recording}: the mesh {name} in it: {reason}; give another one with --mesh {file.stem}=FILE"
+                ) from None
     return meshes

@@ -1,8 +1,8 @@
-"""Takes exported by OptiTrack Motive as CSV: the rigid bodies in it.
+"""Reads the rigid bodies of a take that OptiTrack Motive exported as CSV.
 
-The first line is pairs of a key and a value. The table's head starts at the line `,Type,…`: Type, Name, ID, perhaps
-Parent, then Rotation or Position, then the component. Empty cells are frames in which a body was lost. The time
-column is rounded to a millisecond, so times are frame ÷ rate.
+The first line holds pairs of a key and a value. The head of the table starts at the line `,Type,…`: Type, Name, ID,
+perhaps Parent, then Rotation or Position, then the component. An empty cell means that a body was lost in that frame.
+The time column is rounded to a millisecond, so times are computed as frame ÷ rate.
 Source: docs.optitrack.com, "Data Export: CSV".
 """
 
@@ -23,12 +23,12 @@ UNTRACKED = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class MotiveCsvError(ValueError):
-    """A CSV file that is no usable Motive export; the text names the file, the place and the remedy."""
+    """A CSV file is not a usable Motive export; the text names the file, the place and the remedy."""
 
 
 @dataclass(frozen=True)
 class MotiveCsv:
-    """Poses `(T, 7)`, metres, and which were tracked `(T,)`, by rigid body; `time_s (T,)` from the take's start."""
+    """Poses `(T, 7)` in metres and whether they were tracked `(T,)`, by rigid body; `time_s (T,)` from the start."""
 
     rate_hz: float
     time_s: Array
@@ -37,7 +37,7 @@ class MotiveCsv:
 
 @dataclass(frozen=True)
 class _Body:
-    """Columns of one rigid body by component."""
+    """The columns of one rigid body, by component."""
 
     rotation: dict[str, int]
     position: dict[str, int]
@@ -62,7 +62,7 @@ def _parse(lines: list[list[str]]) -> MotiveCsv:
     head = next((i for i, line in enumerate(lines) if line[1:2] == ["Type"]), None)
     first = next((i for i, line in enumerate(lines) if line[:1] == ["Frame"]), None)
     if "Format Version" not in options or head is None or first is None or first < head:
-        raise MotiveCsvError("is no CSV export of Motive; export it with Header Information on")
+        raise MotiveCsvError("is not a CSV export of Motive; turn on Header Information when exporting")
     rate_hz = _rate(options)
     scale, rotation = _choice(options, "Length Units", UNITS_M), options.get("Rotation Type", "Quaternion")
     if options.get("Coordinate Space", "Global") != "Global":
@@ -106,12 +106,14 @@ def _bodies(head: list[list[str]]) -> dict[str, _Body]:
     bodies = {name: body for name, body in bodies.items() if body.rotation and body.position.keys() == set("XYZ")}
     if not bodies:
         found = ", ".join(sorted(set(types[2:]))) or "nothing"
-        raise MotiveCsvError(f"has no rigid body with rotation and position, only {found}; export Rigid Bodies")
+        raise MotiveCsvError(
+            f"has no rigid body with rotation and position, only {found}; turn on Rigid Bodies when exporting"
+        )
     return bodies
 
 
 def _values(lines: list[list[str]], number: int, width: int) -> tuple[Array, Array]:
-    """Frame numbers `(T,)` and all cells `(T, width)`, NaN where empty."""
+    """Frame numbers `(T,)` and all cells `(T, width)`, in which an empty cell is NaN."""
     rows = []
     for line_number, line in enumerate(lines, start=number):
         if not any(line):
@@ -121,19 +123,19 @@ def _values(lines: list[list[str]], number: int, width: int) -> tuple[Array, Arr
         except ValueError as error:
             raise MotiveCsvError(f"line {line_number}: {error}") from None
     if not rows or np.isnan(frames := np.array(rows)[:, 0]).any() or (np.diff(frames) <= 0.0).any():
-        raise MotiveCsvError("frame numbers must be there and rise")
+        raise MotiveCsvError("every line of the table must start with a frame number greater than the one before")
     return frames, np.array(rows)
 
 
 def _track(name: str, body: _Body, values: Array, scale: float, rotation: str) -> tuple[Array, NDArray[np.bool_]]:
-    """Poses and where they were tracked; a lost body stays where it was last, or will be first."""
+    """Poses, and whether they were tracked; a lost body keeps its last pose, or has its first one before that."""
     positions = scale * values[:, [body.position[axis] for axis in "XYZ"]]
     if rotation == "Quaternion" and body.rotation.keys() == set(QUATERNION):
         quats = values[:, [body.rotation[axis] for axis in QUATERNION]]
         quats = np.where(np.linalg.norm(quats, axis=1, keepdims=True) > 1e-6, quats, np.nan)
     elif rotation in EULER_ORDERS and body.rotation.keys() == set("XYZ"):
         angles = values[:, [body.rotation[axis] for axis in rotation]]
-        # The axes turn with the body, the one named first first.
+        # Rotations are about the body's own axes, in the order of the name.
         quats = Rotation.from_euler(rotation, np.nan_to_num(angles), degrees=True).as_quat() + 0.0 * angles[:, :1]
     else:
         found = f"{'/'.join(body.rotation)} of the type {rotation}"

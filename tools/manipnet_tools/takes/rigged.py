@@ -1,6 +1,6 @@
-"""Takes as a rig sees them: which body is which wrist or prop, where those sit on it, and how large the hands are.
+"""Applies a rig to a take: which body is which wrist or prop, where those sit on it, and the size of the hands.
 
-What a tracker sent is bodies; what a server recorded, beside the hands it made, are wrists and props already.
+A tracker sends bodies, to which a rig must be applied. A recording made beside a server has wrists and props already.
 """
 
 from collections.abc import Mapping
@@ -17,8 +17,8 @@ from manipnet_tools.takes.take import BodyTrack, Take, TakeError, conventional, 
 
 @dataclass(frozen=True)
 class RigText:
-    """A rig file's text, `where` it is from for errors, who of its actors is meant (the first by default), and the
-    meshes of that one's props."""
+    """The text of a rig file, its origin `where` for error messages, the name of one of its actors (by default the
+    first), and the meshes of that actor's props."""
 
     text: str
     where: str
@@ -26,65 +26,67 @@ class RigText:
     meshes: Mapping[str, MeshFile] = field(default_factory=dict)
 
     def config(self) -> ActorConfig:
-        """The actor. Raises `ConfigError` and `TakeError`."""
+        """The actor's configuration. Raises `ConfigError` and `TakeError`."""
         actors = {actor.name: actor for actor in parse_rig(self.text, Path(), self.where, find_mesh=Path).actors}
         if self.actor is not None and self.actor not in actors:
-            raise TakeError(f"{self.where}: --actor {self.actor} is not one of {', '.join(actors)}")
+            raise TakeError(f"{self.where}: there is no actor {self.actor!r}; the actors are {', '.join(actors)}")
         return actors[self.actor or next(iter(actors))]
 
 
 @dataclass(frozen=True)
-class Staged:
-    """A take of wrists and props, and the size of its hands over the model's."""
+class RiggedTake:
+    """A take of wrists and props, and the size of its hands relative to the model's."""
 
     take: Take
     hand_scale: float = 1.0
 
 
 def read_rig(file: Path | None, actor: str | None = None) -> RigText | None:
-    """A rig file; None without one. Raises `ConfigError` and `TakeError`."""
+    """Read a rig file, if there is one. Raises `ConfigError` and `TakeError`."""
     if file is None:
         return None
     actors = {one.name: one for one in load_rig(file).actors}
     rig = RigText(file.read_text(encoding="utf-8-sig"), str(file), actor)
-    things = actors[rig.config().name].objects
-    return replace(
-        rig, meshes={thing.name: MeshFile(thing.mesh.absolute(), thing.unit, thing.scale) for thing in things}
-    )
+    props = actors[rig.config().name].objects
+    return replace(rig, meshes={prop.name: MeshFile(prop.mesh.absolute(), prop.unit, prop.scale) for prop in props})
 
 
-def read_staged(path: Path, rig: RigText | None = None) -> Staged:
-    """A take as its rig sees it: `rig`, or else the one that a recording of bodies alone keeps.
+def read_rigged(path: Path, rig: RigText | None = None) -> RiggedTake:
+    """Read a take and apply `rig`, or else the rig that is kept in a recording of bodies alone.
 
     Raises `TakeError` and `ConfigError`.
     """
     take = read_take(path)
     about = read_about(path) if path.suffix.lower() == ".mcap" else None
     if about is not None and about.counts.get(HANDS):
-        return Staged(take, _shown_scale(path) if rig is None else rig.config().hand_scale)
+        return RiggedTake(take, _recorded_scale(path) if rig is None else rig.config().hand_scale)
     if rig is None and about is not None and "rig" in about.metadata:
         rig = RigText(about.metadata["rig"], f"the rig in {path}")
     if rig is None:
-        return Staged(take)
+        return RiggedTake(take)
     config = rig.config()
-    return Staged(cast(take, config, rig.where), config.hand_scale)
+    return RiggedTake(apply_rig(take, config, rig.where), config.hand_scale)
 
 
-def cast(take: Take, config: ActorConfig, where: str) -> Take:
-    """The take's bodies as the wrists and props of an actor, where those sit on them; bodies the rig does not know
-    stay as they are. Raises `TakeError` for a wrist whose body is not there."""
-    parts: Mapping[str, BodyConfig] = config.wrists | {thing.name: thing.body for thing in config.objects}
+def apply_rig(take: Take, config: ActorConfig, where: str) -> Take:
+    """Turn the take's bodies into the wrists and props of an actor.
+
+    Bodies that are not in the rig stay as they are. Raises `TakeError` if the body of a wrist is missing.
+    """
+    parts: Mapping[str, BodyConfig] = config.wrists | {prop.name: prop.body for prop in config.objects}
     names = {part: _name(take, body) for part, body in parts.items()}
     for wrist, body in config.wrists.items():
         if names[wrist] is None:
-            raise TakeError(f"{where}: bodies.{wrist} is {body.key!r}; {take.name} has {', '.join(take.bodies)}")
+            raise TakeError(
+                f"{where}: bodies.{wrist} is {body.key!r}, but the bodies of {take.name} are {', '.join(take.bodies)}"
+            )
     known = {part: _placed(take.bodies[name], parts[part]) for part, name in names.items() if name is not None}
     others = {name: track for name, track in take.bodies.items() if name not in names.values()}
     return replace(take, bodies=others | known)
 
 
 def _name(take: Take, body: BodyConfig) -> str | None:
-    """What the take calls a body of the rig."""
+    """The take's name of a body in the rig, or None."""
     return next((name for name in (str(body.key), conventional(str(body.key))) if name in take.bodies), None)
 
 
@@ -92,7 +94,7 @@ def _placed(track: BodyTrack, body: BodyConfig) -> BodyTrack:
     return track if body.offset is None else replace(track, poses=compose(track.poses, body.offset))
 
 
-def _shown_scale(recording: Path) -> float:
-    """The size of the hands that a recording shows."""
+def _recorded_scale(recording: Path) -> float:
+    """The size of the hands in a recording, relative to the model's."""
     hands = next(iter(read_hands(recording))).hands.values()
     return next((hand.scale for hand in hands), 1.0)

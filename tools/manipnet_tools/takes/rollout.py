@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from manipnet.actors.props import Prop, choose_prop
 from manipnet.geometry import Array
-from manipnet.synthesis.model.layout import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene, HandStep, Side, Synthesizer
-from manipnet.tracking.timeline import BodyAtTick, Tick, Timeline
+from manipnet.tracking.tick import BodyAtTick, Tick
+from manipnet.tracking.timeline import Timeline
 from manipnet_tools.takes.take import Take, TakeError
 
 SIDES: tuple[Side, ...] = ("left", "right")

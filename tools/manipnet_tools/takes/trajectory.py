@@ -1,7 +1,7 @@
-"""Trajectory texts, the format the ManipNet dataset gives its motions without fingers in.
+"""Reads trajectory texts, the format of the ManipNet dataset's motions without fingers.
 
-The first line is the rate in hertz; every other one has 21 numbers: object, left wrist, right wrist, each a quaternion
-x y z w and a position, left-handed decimetres. The object's position is the centre of its bounding box.
+The first line is the rate in hertz. Every other line has 21 numbers: object, left wrist and right wrist, each as a
+quaternion x y z w and a position in left-handed decimetres. The object's position is the centre of its bounding box.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ DECIMETRE_M = 0.1
 
 
 class TrajectoryError(ValueError):
-    """A trajectory text that cannot be read; the text names the file, the place and what was expected."""
+    """A trajectory text cannot be read; the message names the file, the place and what was expected."""
 
 
 def read_trajectory(path: Path) -> tuple[float, dict[str, Array]]:
@@ -31,7 +31,7 @@ def read_trajectory(path: Path) -> tuple[float, dict[str, Array]]:
     rate_hz = _rate(lines[0] if lines else "", path)
     rows = [_row(line, f"{path}:{number}") for number, line in enumerate(lines[1:], start=2) if line.strip()]
     if not rows:
-        raise TrajectoryError(f"{path}: holds no frame; every line after the first is one")
+        raise TrajectoryError(f"{path}: has no frames; every line after the first must be a frame")
     values = np.array(rows).reshape(len(rows), len(BODIES), 7)
     poses = {
         name: np.concatenate([DECIMETRE_M * values[:, i, 4:], values[:, i, :4]], 1) for i, name in enumerate(BODIES)
@@ -51,14 +51,16 @@ def _rate(line: str, path: Path) -> float:
     except ValueError:
         rate_hz = 0.0
     if not 1.0 <= rate_hz <= 1000.0:
-        raise TrajectoryError(f"{path}:1: {line[:40]!r} is no rate; the first line must be 1 to 1000 Hz, as 120")
+        raise TrajectoryError(
+            f"{path}:1: {line[:40]!r} is not a rate; the first line must be a rate of 1 to 1000 Hz, for example 120"
+        )
     return rate_hz
 
 
 def _row(line: str, where: str) -> list[float]:
     cells = line.split(",")
     if len(cells) != COLUMNS:
-        raise TrajectoryError(f"{where}: {len(cells)} values; a frame has {COLUMNS}, separated by commas")
+        raise TrajectoryError(f"{where}: {len(cells)} values; a frame must have {COLUMNS}, separated by commas")
     try:
         row = [float(cell) for cell in cells]
     except ValueError as error:

@@ -1,15 +1,17 @@
-"""Bodies straight from OptiTrack Motive: connects, learns version and names, keeps the stream and the clock alive."""
+"""A client of OptiTrack Motive: it connects, learns the version and the bodies' names, and keeps the stream alive."""
 
 import logging
 import socket
 import time
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
-from manipnet.inputs.base import Intake, Sink
+from manipnet.common.options import Network
+from manipnet.inputs.base import Intake
+from manipnet.inputs.declaration import Receiver
 from manipnet.inputs.natnet.frames import MocapFrame, RigidBody, read_body_names, read_frame
+from manipnet.inputs.natnet.options import NatNetOptions
 from manipnet.inputs.natnet.protocol import (
-    COMMAND_PORT,
     MULTICAST_GROUP,
     MessageId,
     ServerInfo,
@@ -20,23 +22,23 @@ from manipnet.inputs.natnet.protocol import (
     read_server_info,
     write_packet,
 )
-from manipnet.net.addresses import AllowList, Network
+from manipnet.net.addresses import AllowList
 from manipnet.net.clock_offset import ClockProbes
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.udp import Address, UdpThread, bind_udp, join_multicast, local_address_towards
-from manipnet.telemetry import Telemetry
+from manipnet.telemetry import Gauge
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, make_sample
 
-KNOCK_S = 1.0
+CONNECT_S = 1.0
+"""How often the client asks a server that sends no frames to connect."""
 KEEP_ALIVE_S = 1.0
 ECHO_S = 1.0
 SILENT_S = 3.0
-"""Without a packet for this long the server is believed gone, and is asked to connect again."""
+"""A server that has sent nothing for this long counts as gone, and is asked to connect again."""
 CHORES_S = 0.1
 
 STATES = ("connecting", "connected", "streaming", "silent")
-UpAxis = Literal["y", "z"]
 _STREAMS_MULTICAST = (
     "the server streams multicast: start with --multicast, or choose Unicast as Transmission Type in Motive's "
     "streaming settings"
@@ -44,31 +46,20 @@ _STREAMS_MULTICAST = (
 _log = logging.getLogger(__name__)
 
 
-class NatNetBodies:
-    """A NatNet client of the server at `host:port`, unicast or multicast.
+class NatNetBodies(Receiver):
+    """A NatNet client of the server that `options` name, by unicast or multicast.
 
-    `interface` is the address of the network card that faces the server (default: the one the system would
-    send through), `up` the axis that Motive streams as up, which no packet tells. Datagrams from other hosts are
-    refused, except frames from the networks in `allow` (a Motive with two network cards).
+    Datagrams from other hosts are refused, except frames from the networks in `allow`, for a Motive with two network
+    cards. Without an interface in `options`, the system's choice towards the server is taken.
     """
 
-    def __init__(
-        self,
-        sink: Sink,
-        telemetry: Telemetry,
-        host: str,
-        port: int = COMMAND_PORT,
-        *,
-        multicast: bool = False,
-        interface: str | None = None,
-        up: UpAxis = "y",
-        allow: Sequence[Network] = (),
-    ) -> None:
-        self._intake = Intake("natnet", sink, telemetry)
-        self._guard, self._allowed = SourceRateLimiter(), AllowList(allow)
-        self._host, self._port = host, port
-        self._multicast, self._interface, self._up = multicast, interface, up
-        self._server: Address = (host, port)
+    def __init__(self, intake: Intake, options: NatNetOptions, allow: Sequence[Network] = ()) -> None:
+        assert options.natnet is not None
+        self._intake = intake
+        self._rate_limiter, self._allowed = SourceRateLimiter(), AllowList(allow)
+        self._host, self._port = options.natnet
+        self._multicast, self._interface, self._up = options.multicast, options.interface, options.up
+        self._server: Address = options.natnet
         self._command: UdpThread | None = None
         self._data: UdpThread | None = None
         self._info: ServerInfo | None = None
@@ -80,10 +71,10 @@ class NatNetBodies:
         self._done_s: dict[str, float] = {}
         self._echo_stamp = 0
         self._problem: str | None = None
-        self.address = f"natnet://{host}:{port}"
+        self.address = f"natnet://{self._host}:{self._port}"
 
     def start(self) -> None:
-        """Open the command socket and begin to knock; raises `ListenError` for a wrong host or interface."""
+        """Open the command socket and begin to connect. Raises `ListenError` for a wrong host or interface."""
         try:
             resolved = socket.getaddrinfo(self._host, self._port, socket.AF_INET, socket.SOCK_DGRAM)
         except (OSError, UnicodeError) as error:
@@ -92,12 +83,12 @@ class NatNetBodies:
             ) from None
         self._server = (str(resolved[0][4][0]), self._port)
         self._interface = self._interface or local_address_towards(*self._server)
-        command = bind_udp("NatNet answers", self._interface, 0)
+        command = bind_udp(self._interface, 0)
         self._command = UdpThread(command, self._receive, self._do_chores, self._lost)
         self._command.start()
 
     def stop(self) -> None:
-        """Leave the server and close the sockets; returns when both are done. Harmless when not started."""
+        """Disconnect from the server and close the sockets. Does nothing if the client was not started."""
         if self._command is not None:
             self._send(MessageId.DISCONNECT)
             self._command.stop()
@@ -107,8 +98,10 @@ class NatNetBodies:
             self._data = None
 
     def status(self) -> dict[str, Any]:
-        """What a person needs to know: state, server, names of the bodies, what is wrong; and two offsets from our
-        clock: `clock_offset_s` of the server's, `capture_offset_s` of the frames' times (at the exposure).
+        """The state, the server, the names of its bodies, what is wrong, and two offsets from this machine's clock.
+
+        `clock_offset_s` is the offset of the server's clock, and `capture_offset_s` that of the frames' times, which
+        are those of the exposure.
         """
         now_s = time.monotonic()
         info, offset, ahead_s = self._info, self._clock.best(now_s), self._stamps_ahead_s
@@ -122,6 +115,14 @@ class NatNetBodies:
             "problem": self._problem,
         }
 
+    def gauges(self) -> Iterator[Gauge]:
+        """The state and the clock offsets."""
+        status = self.status()
+        yield "natnet_state", "state", {state: float(state == status["state"]) for state in STATES}
+        for name in ("clock_offset", "clock_uncertainty", "capture_offset"):
+            value = status[f"{name}_s"]
+            yield f"{name}_seconds", "clock", {} if value is None else {"natnet": value}
+
     def _state(self, now_s: float) -> str:
         if self._info is None:
             return "connecting"
@@ -132,12 +133,12 @@ class NatNetBodies:
     # Chores of the command thread
 
     def _do_chores(self, now_s: float) -> float:
-        # A server that was started anew answers echoes but has forgotten its unicast clients: without frames, knock.
-        if now_s - self._framed_s > SILENT_S and self._is_due("knock", now_s, KNOCK_S):
+        # A server that was restarted answers echoes but has forgotten its unicast clients, so frames are what counts.
+        if now_s - self._framed_s > SILENT_S and self._is_due("connect", now_s, CONNECT_S):
             self._send(MessageId.CONNECT, connect_payload("ManipNet Live"))
         if self._info is None:
             return CHORES_S
-        if self._names_wanted and self._is_due("names", now_s, KNOCK_S):
+        if self._names_wanted and self._is_due("names", now_s, CONNECT_S):
             self._send(MessageId.MODEL_REQUEST)
         if not self._multicast and self._is_due("keep alive", now_s, KEEP_ALIVE_S):
             self._send(MessageId.KEEP_ALIVE)
@@ -164,12 +165,12 @@ class NatNetBodies:
 
     def _receive(self, packet: bytes, sender: Address, now_s: float) -> None:
         source = f"natnet:{sender[0]}:{sender[1]}"
-        if not self._guard.admits(sender, now_s):
-            self._intake.drop("rate", "natnet", "more packets than can be read from senders unknown so far")
+        if not self._rate_limiter.admits(sender, now_s):
+            self._intake.drop("rate", "natnet", "more packets than are read from senders that are not known yet")
             return
         from_server = sender[0] == self._server[0]
         if not (from_server or self._allowed(sender[0])):
-            self._guard.bad(sender)
+            self._rate_limiter.bad(sender)
             self._intake.drop("not_allowed", source, f"the NatNet server is {self._server[0]}")
             return
         try:
@@ -177,10 +178,10 @@ class NatNetBodies:
             if from_server or message_id == MessageId.FRAME:
                 self._take(message_id, payload, source, now_s)
         except MessageError as error:
-            self._guard.bad(sender)
+            self._rate_limiter.bad(sender)
             self._intake.drop("malformed", source, error)
             return
-        self._guard.good(sender)
+        self._rate_limiter.good(sender)
         self._heard_s = now_s
 
     def _take(self, message_id: int, payload: bytes, source: str, now_s: float) -> None:
@@ -214,7 +215,7 @@ class NatNetBodies:
         self._report(self._listen_to(info))
 
     def _listen_to(self, info: ServerInfo) -> str | None:
-        """Join the server's multicast group where that was asked for; says why its frames will not come, or None."""
+        """Join the server's multicast group if `multicast` asks for it. Returns why no frames will come, or None."""
         if not self._multicast:
             return None if info.multicast_group is None else _STREAMS_MULTICAST
         if self._data is None:
@@ -229,7 +230,7 @@ class NatNetBodies:
 
     def _take_frame(self, payload: bytes, source: str, now_s: float) -> None:
         if self._info is None:
-            self._intake.drop("unsupported", source, "a frame before the server told its version")
+            self._intake.drop("unsupported", source, "a frame arrived before the server had told its version")
             return
         frame = read_frame(payload, self._info.version)
         if frame.exposed_ticks and self._info.clock_hz:
@@ -250,7 +251,7 @@ class NatNetBodies:
         return make_sample(body.id, self._names.get(body.id), (x, y, z), (qx, qy, qz, qw), body.tracked)
 
     def _report(self, problem: str | None) -> None:
-        """Say once what is wrong. One assignment: whoever asks for the status never sees a problem flicker."""
+        """Log a problem once. The problem is assigned in one step, so that it does not flicker in the status."""
         before, self._problem = self._problem, problem
         if problem is not None and problem != before:
             _log.warning("NatNet: %s", problem)

@@ -14,7 +14,6 @@ Version = tuple[int, int]
 
 OLDEST: Version = (3, 0)
 NEWEST: Version = (4, 5)
-COMMAND_PORT = 1510
 DATA_PORT = 1511
 MULTICAST_GROUP = "239.255.42.99"
 

@@ -1,41 +1,37 @@
-"""Bodies over OSC: a bound UDP socket with its own thread, every sender's messages gathered into frames."""
+"""Receives OSC on a bound UDP socket with a thread of its own, and gathers each sender's messages into frames."""
 
 from collections.abc import Sequence
 
-from manipnet.inputs.base import Intake, Sink
+from manipnet.common.options import Network
+from manipnet.inputs.base import Intake
+from manipnet.inputs.declaration import Receiver
 from manipnet.inputs.osc.assembler import GAP_S, FrameAssembler
 from manipnet.inputs.osc.packet import split_packet
-from manipnet.net.addresses import AllowList, Network
+from manipnet.net.addresses import AllowList
 from manipnet.net.flood_filter import FloodFilter, FloodWatch
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.udp import Address, UdpThread, bind_udp
-from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, MessageError
 
 MAX_SENDERS = 16
 DATAGRAMS_PER_S = 20_000
-"""Of one sender: loose messages make three datagrams of a body."""
+"""Datagrams read of one sender: a sender of loose messages needs three for each body."""
 IDLE_S = 0.1
-_FLOOD = "more datagrams than are read, of one sender or of those unknown so far"
+_FLOOD = "more datagrams than are read, from one sender or from senders that are not known yet"
 
 
-class OscBodies:
-    """Receives OSC on `host:port`; port 0 takes a free one, see `address` after `start`.
+class OscBodies(Receiver):
+    """Receives OSC on `host:port`. Port 0 takes any free port, which `address` names after `start`.
 
-    `allow` names the networks that may send; None means any that reaches the socket.
+    Only addresses in the networks of `allow` may send; if there are none, any address may.
     """
 
     def __init__(
-        self,
-        sink: Sink,
-        telemetry: Telemetry,
-        host: str = "127.0.0.1",
-        port: int = 39540,
-        allow: Sequence[Network] | None = None,
+        self, intake: Intake, host: str = "127.0.0.1", port: int = 39540, allow: Sequence[Network] = ()
     ) -> None:
-        self._intake = Intake("osc", sink, telemetry)
-        self._guard = SourceRateLimiter(DATAGRAMS_PER_S)
-        self._allowed = AllowList(allow)
+        self._intake = intake
+        self._rate_limiter = SourceRateLimiter(DATAGRAMS_PER_S)
+        self._allowed = AllowList(allow or None)
         self._host, self._port = host, port
         self._assemblers: dict[Address, FrameAssembler] = {}
         self._thread: UdpThread | None = None
@@ -43,8 +39,8 @@ class OscBodies:
         self.address = f"udp://{host}:{port}"
 
     def start(self) -> None:
-        """Bind and begin to receive; raises `ListenError` when the address cannot be bound."""
-        udp = bind_udp("OSC", self._host, self._port)
+        """Bind and begin to receive. Raises `ListenError`."""
+        udp = bind_udp(self._host, self._port)
         host, port = udp.getsockname()[:2]
         self.address = f"udp://[{host}]:{port}" if ":" in host else f"udp://{host}:{port}"
         self._flood = FloodWatch(FloodFilter(udp))
@@ -52,38 +48,38 @@ class OscBodies:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop receiving and free the port; returns when both are done. Harmless when not started."""
+        """Stop receiving and free the port. Does nothing if the receiver was not started."""
         if self._thread is not None:
             self._thread.stop()
             self._thread = None
 
     def _receive(self, datagram: bytes, sender: Address, now_s: float) -> None:
-        if not self._guard.admits(sender, now_s):
+        if not self._rate_limiter.admits(sender, now_s):
             self._intake.drop("rate", "osc", _FLOOD)
             if self._flood is not None:
                 self._flood.add()
             return
         if not self._allowed(sender[0]):
-            self._guard.bad(sender)
-            self._intake.drop("not_allowed", _name(sender), "the address is not on the allow-list for OSC")
+            self._rate_limiter.bad(sender)
+            self._intake.drop("not_allowed", _name(sender), "its address is in no network of --allow")
             return
         assembler = self._assemblers.get(sender) or FrameAssembler(f"osc:{_name(sender)}")
         before = assembler.incomplete
         try:
-            frames, ours = assembler.add(split_packet(datagram), now_s)
+            frames, relevant = assembler.add(split_packet(datagram), now_s)
         except MessageError as error:
-            self._guard.bad(sender)
+            self._rate_limiter.bad(sender)
             self._intake.drop("malformed", assembler.source, error)
             return
-        if ours:
-            self._guard.good(sender)
+        if relevant:
+            self._rate_limiter.good(sender)
             self._remember(sender, assembler)
         self._pass_on(assembler, frames, before)
 
     def _remember(self, sender: Address, assembler: FrameAssembler) -> None:
         self._assemblers.pop(sender, None)
         if len(self._assemblers) >= MAX_SENDERS:
-            del self._assemblers[next(iter(self._assemblers))]  # the one not heard for longest
+            del self._assemblers[next(iter(self._assemblers))]  # the sender that has been silent for longest
         self._assemblers[sender] = assembler
 
     def _idle(self, now_s: float) -> float:
@@ -99,7 +95,7 @@ class OscBodies:
 
     def _pass_on(self, assembler: FrameAssembler, frames: list[BodyFrame], incomplete_before: int) -> None:
         if lost := assembler.incomplete - incomplete_before:
-            self._intake.drop("incomplete", assembler.source, "a frame without its time stamp", lost)
+            self._intake.drop("incomplete", assembler.source, "a frame has no time stamp, or too many bodies", lost)
         for frame in frames:
             self._intake.accept(frame)
 

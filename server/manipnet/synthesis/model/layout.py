@@ -9,8 +9,9 @@ from typing import Final
 
 import numpy as np
 
-MAX_LOOK_AHEAD_S: Final = 0.5
-WINDOW_OFFSETS_S: Final = np.linspace(-0.5, 0.5, 21)
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
+
+WINDOW_OFFSETS_S: Final = np.linspace(-MAX_LOOK_AHEAD_S, MAX_LOOK_AHEAD_S, 21)
 """Trajectory samples about the present tick."""
 WINDOW_STEP_S: Final = 0.05
 PRESENT: Final = 10

@@ -1,9 +1,10 @@
 """The objects that come with the server: generated shapes in metres, Y up, by name."""
 
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from manipnet.synthesis.objects.mesh import ClosedMesh, MeshError, load_mesh
+if TYPE_CHECKING:
+    from manipnet.synthesis.objects.mesh import ClosedMesh
 
 LIBRARY_FOLDER: Final = Path(__file__).with_name("meshes")
 
@@ -18,8 +19,10 @@ def library_file(name: str) -> Path | None:
     return LIBRARY_FOLDER / f"{name}.ply" if name in library_names() else None
 
 
-def load_library_mesh(name: str, scale: float = 1.0) -> ClosedMesh:
+def load_library_mesh(name: str, scale: float = 1.0) -> "ClosedMesh":
     """The library object `name`; raises `MeshError` for a name it does not have."""
+    from manipnet.synthesis.objects.mesh import MeshError, load_mesh  # what only needs the names does without trimesh
+
     if name not in library_names():
         raise MeshError(f"no object {name!r} in the library; it has {', '.join(library_names())}")
     return load_mesh(LIBRARY_FOLDER / f"{name}.ply", scale=scale)

@@ -18,8 +18,8 @@ from manipnet.synthesis.objects.repair import (
     signed_volume,
     weld,
 )
+from manipnet.synthesis.objects.units import UNITS_M
 
-UNITS_M: Final = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 FORMATS: Final = (".obj", ".ply", ".stl", ".glb")
 MAX_FACES: Final = 300_000
 MAX_FILE_BYTES: Final = 200_000_000

@@ -1,8 +1,6 @@
 """A shape: what the hands sense of an object. Built once from a closed mesh, cached on disk by its content."""
 
-import logging
 import os
-import zipfile
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,14 +20,15 @@ from manipnet.synthesis.objects.distance_field import (
     build_field,
     signed_distance,
 )
+from manipnet.synthesis.objects.library import library_file
 from manipnet.synthesis.objects.mesh import ClosedMesh, load_mesh
 from manipnet.synthesis.objects.rays import RayScene, ray_scene
+from manipnet.synthesis.objects.shape_cache import read_cached, write_cached
 from manipnet.synthesis.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES, simplified
 
 _CACHE_VERSION = f"1-{RESOLUTION}"
 PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
 """Shapes of the demo's objects, so that a first start need not compile what builds them."""
-_log = logging.getLogger(__name__)
 
 
 class Solid(NamedTuple):
@@ -120,21 +119,26 @@ def _signed_distances(bvh, field, points, exact_within_m, distance, normal):
         distance[i], normal[i, 0], normal[i, 1], normal[i, 2] = d, x, y, z
 
 
-def load_shape(path: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> Shape:
-    """Read a mesh file and build its shape. Raises `MeshError` as `load_mesh` does."""
-    return build_shape(load_mesh(path, unit, scale, name))
+def load_shape(mesh: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> Shape:
+    """Build the shape of a mesh file in `unit`, or of the library object of that name.
+
+    Raises `MeshError` as `load_mesh` does.
+    """
+    if not Path(mesh).is_file() and (file := library_file(str(mesh))) is not None:
+        mesh, unit = file, "m"
+    return build_shape(load_mesh(mesh, unit, scale, name))
 
 
 def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
     folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
     path = folder / cache_name(mesh)
-    parts = _read_cache(path) or _read_cache(PREBUILT_FOLDER / path.name)
+    parts = read_cached(path) or read_cached(PREBUILT_FOLDER / path.name)
     if parts is None:
         sensed = simplified(mesh)
         bvh = build_bvh(sensed.vertices, sensed.faces)
         parts = bvh, build_field(bvh)
-        _write_cache(path, *parts)
+        write_cached(path, *parts)
     mass = mass_properties(mesh.vertices[mesh.faces])
     inertia = np.asarray(mass["inertia"]) / mass["mass"]
     return Shape(mesh, *parts, np.asarray(mass["center_mass"]), float(mass["volume"]), inertia)
@@ -144,26 +148,3 @@ def cache_name(mesh: ClosedMesh) -> str:
     """File name of a mesh's shape in any cache folder."""
     fewer = f"-{FEWER_TRIANGLES}" if len(mesh.faces) > MOST_TRIANGLES else ""
     return f"{mesh.content_hash[:32]}-{_CACHE_VERSION}{fewer}.npz"
-
-
-def _read_cache(path: Path) -> tuple[Bvh, Field] | None:
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
-            bvh = Bvh(*(data[name] for name in Bvh._fields))
-            return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        _log.warning("shape cache %s is unreadable (%s); building the shape again", path, error)
-        return None
-
-
-def _write_cache(path: Path, bvh: Bvh, field: Field) -> None:
-    part = path.with_suffix(f".{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with open(part, "wb") as file:
-            np.savez(file, **bvh._asdict(), **field._asdict())
-        part.replace(path)
-    except OSError as error:
-        _log.warning("shape cache %s cannot be written (%s); the next start builds it again", path, error)

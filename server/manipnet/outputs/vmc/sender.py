@@ -6,17 +6,17 @@ Source: VMC protocol specification, marionette side.
 """
 
 import socket
-import struct
 
 import numpy as np
 
 from manipnet.geometry import Array, matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity
+from manipnet.outputs.declaration import EncodedHands, HandsOutput
+from manipnet.outputs.vmc.bundle import HandBundle
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.skeleton import BONE_COUNT, DOF_COUNT, PARENTS
-from manipnet.wire import HandPose, HandsMessage, Side
+from manipnet.wire import SIDES, HandPose, Side
 
-DEFAULT_PORT = 39539
 FOREARM_M = 0.25
 """Where the hand sits in the forearm, for receivers that apply positions too: nobody tracks the elbow."""
 
@@ -45,26 +45,28 @@ _T_POSE_DIRECTIONS[1:5] = [np.sqrt(0.5), np.sqrt(0.5), 0.0]
 """Where each bone of the receiver's T-pose points, in the wrist frame: fingers along the hand, thumb at 45 degrees."""
 
 
-class VmcSender:
+class VmcSender(HandsOutput):
     """Sends every message's hands to one receiver. Not thread-safe.
 
     `rest_pose_correction` turns each bone by what its direction at angle zero differs from the T-pose's, so that
     bones point where the hand's do; without it angle zero shows as the T-pose.
     """
 
-    def __init__(self, host: str, port: int = DEFAULT_PORT, rest_pose_correction: bool = True) -> None:
+    def __init__(self, host: str, port: int, rest_pose_correction: bool = True) -> None:
         self._address = (host, port)
         self._correction = _rest_pose_correction() if rest_pose_correction else _IDENTITY_CORRECTION
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._start_s: float | None = None
 
-    def send(self, message: HandsMessage) -> None:
-        """One datagram per hand. Raises `OSError` when the address cannot be reached at all."""
+    def send(self, hands: EncodedHands) -> bool:
+        """Send one datagram for each hand. Raises `OSError` if the address cannot be reached."""
+        message = hands.message
         if self._start_s is None:
             self._start_s = message.t_publish
         for side, hand in message.hands.items():
             bundle = hand_bundle(side, hand, message.t_publish - self._start_s, self._correction)
             self._socket.sendto(bundle, self._address)
+        return True
 
     def close(self) -> None:
         """Close the socket."""
@@ -73,10 +75,7 @@ class VmcSender:
 
 def hand_bundle(side: Side, hand: HandPose, t_s: float, correction: Array) -> bytes:
     """The OSC bundle of one hand: OK, T and its 16 bones."""
-    messages = [osc_message("/VMC/Ext/OK", 1), osc_message("/VMC/Ext/T", float(t_s))]
-    for name, pose in bone_poses(side, hand, correction).items():
-        messages.append(osc_message("/VMC/Ext/Bone/Pos", name, *pose.tolist()))
-    return b"#bundle\0" + struct.pack(">Q", 1) + b"".join(struct.pack(">i", len(m)) + m for m in messages)
+    return _BUNDLES[side].filled(t_s, np.array(list(bone_poses(side, hand, correction).values())))
 
 
 def bone_poses(side: Side, hand: HandPose, correction: Array) -> dict[str, Array]:
@@ -87,25 +86,11 @@ def bone_poses(side: Side, hand: HandPose, correction: Array) -> dict[str, Array
     poses = np.vstack([wrist, np.hstack([_T_POSE_OFFSETS, fingers])])
     # So far it is a right hand. A left one is its mirror image, and Unity's axes mirror once more.
     in_unity = to_unity(poses) if side == "right" else poses
-    return dict(zip((side.capitalize() + name for name in ("Hand", *FINGER_BONES)), in_unity, strict=True))
+    return dict(zip(_names(side), in_unity, strict=True))
 
 
-def osc_message(address: str, *arguments: int | float | str) -> bytes:
-    """An OSC message: padded address, type tags, big-endian arguments."""
-    tags, data = ",", b""
-    for value in arguments:
-        if isinstance(value, str):
-            tags, data = tags + "s", data + _padded(value)
-        elif isinstance(value, int):
-            tags, data = tags + "i", data + struct.pack(">i", value)
-        else:
-            tags, data = tags + "f", data + struct.pack(">f", value)
-    return _padded(address) + _padded(tags) + data
-
-
-def _padded(text: str) -> bytes:
-    data = text.encode()
-    return data + bytes(4 - len(data) % 4)
+def _names(side: Side) -> list[str]:
+    return [side.capitalize() + bone for bone in ("Hand", *FINGER_BONES)]
 
 
 def _turns_from_t_pose(local: Array, correction: Array) -> Array:
@@ -149,3 +134,4 @@ def _t_pose_offsets() -> Array:
 
 _IDENTITY_CORRECTION = np.tile([0.0, 0.0, 0.0, 1.0], (BONE_COUNT, 1))
 _T_POSE_OFFSETS = _t_pose_offsets()
+_BUNDLES = {side: HandBundle(_names(side)) for side in SIDES}

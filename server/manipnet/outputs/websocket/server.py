@@ -1,4 +1,4 @@
-"""Hands out to browsers: each binary WebSocket message is one `pose/bin` payload, a slow reader skips."""
+"""Publishes hands over WebSocket: each binary message is one `pose/bin` payload, and a slow client skips messages."""
 
 import asyncio
 import contextlib
@@ -10,53 +10,61 @@ from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
+from manipnet.net.errors import cannot_listen
+from manipnet.outputs.declaration import EncodedHands, HandsOutput
 from manipnet.telemetry import Telemetry
 
 MAX_CLIENTS = 32
 QUEUE_LENGTH = 8
-"""Payloads a client may be behind, an eighth of a second; then the oldest go."""
+"""Payloads that wait for a client, about an eighth of a second of hands; beyond it, the oldest are dropped."""
 
 MAX_REQUEST_BYTES, MAX_REQUESTS = 1024, 16
-"""Clients have nothing to say."""
+"""Clients have no reason to send anything."""
 
 LOCAL_PAGES = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
-"""Pages that may connect; any other web site open in the same browser may not watch. Programs send no origin."""
+"""The origins of pages that may connect. Other web sites in the same browser may not. Programs send none."""
 
 _POLICY_VIOLATION, _TRY_AGAIN_LATER = 1008, 1013
 
 
-class WebSocketPublisher:
-    """Serves on its own thread from construction to `stop`. A client that reads slowly skips messages.
+class WebSocketPublisher(HandsOutput):
+    """Serves on a thread of its own, from its creation until `close`."""
 
-    Raises `OSError` when the address cannot be bound.
-    """
-
-    def __init__(self, host: str, port: int, telemetry: Telemetry) -> None:
+    def __init__(self, telemetry: Telemetry, host: str, port: int) -> None:
+        """Bind the port, of which 0 takes any free one. Raises `ListenError`."""
         self._telemetry = telemetry
         self._clients: dict[asyncio.Event, deque[bytes]] = {}
         self._loop = asyncio.new_event_loop()
         try:
             self._server = self._loop.run_until_complete(self._serve(host, port))
-        except BaseException:
+        except BaseException as error:
             self._loop.close()
+            if isinstance(error, OSError):
+                raise cannot_listen(f"ws://{host}:{port}", error.strerror or error) from None
             raise
         port = self._server.sockets[0].getsockname()[1]
         self.address = f"ws://[{host}]:{port}" if ":" in host else f"ws://{host}:{port}"
         self._thread = threading.Thread(target=self._loop.run_forever, name="websocket-out", daemon=True)
         self._thread.start()
 
-    @property
-    def client_count(self) -> int:
-        """How many clients are connected."""
+    def connected(self) -> int:
+        """The number of clients that are connected. From any thread."""
         return len(self._clients)
 
-    def publish(self, payload: bytes) -> None:
-        """Offer a payload to every client; returns at once, from any thread."""
-        with contextlib.suppress(RuntimeError):  # the loop is closed: stopping
-            self._loop.call_soon_threadsafe(self._offer, payload)
+    def send(self, hands: EncodedHands) -> bool:
+        """Offer one message to every client."""
+        return self.publish(hands.binary)
 
-    def stop(self) -> None:
-        """Close all connections and the thread."""
+    def publish(self, payload: bytes) -> bool:
+        """Offer one payload to every client and return at once; False if there is none. From any thread."""
+        if not self._clients:
+            return False
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the server is stopping
+            self._loop.call_soon_threadsafe(self._offer, payload)
+        return True
+
+    def close(self) -> None:
+        """Close all connections and end the thread. Does nothing the second time."""
         if self._loop.is_closed():
             return
         asyncio.run_coroutine_threadsafe(self._close(), self._loop).result()
@@ -80,7 +88,7 @@ class WebSocketPublisher:
             news.set()
 
     async def _feed(self, connection: ServerConnection) -> None:
-        """Send what has come whenever the client has taken the last."""
+        """Send what waits for a client, one payload after another as it takes them."""
         if len(self._clients) >= MAX_CLIENTS:
             self._refuse("too_many")
             await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_CLIENTS} clients")
@@ -101,12 +109,12 @@ class WebSocketPublisher:
             reading.cancel()
 
     async def _ignore(self, connection: ServerConnection, news: asyncio.Event) -> None:
-        """Read and forget, so that a connection closed while nothing is published does not linger; end a chatter."""
+        """Ignore what a client sends, but notice the end of its connection. Cut off a client that goes on sending."""
         with contextlib.suppress(ConnectionClosed):
             for _ in range(MAX_REQUESTS):
                 await connection.recv()
             self._refuse("endless")
-            await connection.close(_POLICY_VIOLATION, "nothing is to be said here")
+            await connection.close(_POLICY_VIOLATION, "clients must not send anything")
         news.set()
 
     def _refuse(self, reason: str) -> None:

@@ -11,25 +11,27 @@ import numpy as np
 
 from manipnet.geometry import Array, compose, invert
 from manipnet.outputs.axes import to_unreal
+from manipnet.outputs.declaration import EncodedHands, HandsOutput
 from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS
-from manipnet.wire import HandsMessage, Side
+from manipnet.wire import Side
 
-DEFAULT_PORT = 54321
 ORDER = (1, 0, *range(2, 26))
 """Wrist first: Live Link wants parents before children."""
 
 
-class LiveLinkJsonSender:
+class LiveLinkJsonSender(HandsOutput):
     """Sends every message's hands to one receiver, as subjects "ManipNet_<actor>_<side>". Not thread-safe."""
 
-    def __init__(self, host: str, port: int = DEFAULT_PORT) -> None:
+    def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
-    def send(self, message: HandsMessage) -> None:
-        """One datagram per hand. Raises `OSError` when the address cannot be reached at all."""
+    def send(self, hands: EncodedHands) -> bool:
+        """Send one datagram for each hand. Raises `OSError` if the address cannot be reached."""
+        message = hands.message
         for side, hand in message.hands.items():
             self._socket.sendto(hand_json(message.actor, side, hand.joints), self._address)
+        return True
 
     def close(self) -> None:
         """Close the socket."""

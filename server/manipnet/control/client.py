@@ -1,0 +1,69 @@
+"""A client of the control port, for the tools and for other programs in Python."""
+
+import json
+from pathlib import Path
+from typing import Any, Final
+
+import zmq
+
+from manipnet.common.options import parse_endpoint
+from manipnet.control.request import RequestError
+from manipnet.net.curve_keys import read_client_keys
+from manipnet.net.zap import secure_client
+
+CONTROL_PORT: Final = 5557
+ANSWER_S: Final = 10.0
+
+
+class ControlClient:
+    """Sends requests to the control port of a server, over one connection each. Any thread may call `ask`."""
+
+    def __init__(self, address: str, keys: Path | None = None, timeout_s: float = ANSWER_S) -> None:
+        """`address` is `HOST`, `HOST:PORT` or `tcp://HOST:PORT`; `keys` is a client's key file.
+
+        Raises `ConfigError` for a malformed address and `KeyFileError` for a malformed key file.
+        """
+        self._host, self._port = parse_endpoint(address.removeprefix("tcp://"), CONTROL_PORT)
+        self._keys = None if keys is None else read_client_keys(keys)
+        self._timeout_s = timeout_s
+
+    @property
+    def address(self) -> str:
+        """The server's address, `tcp://HOST:PORT`."""
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        return f"tcp://{host}:{self._port}"
+
+    def ask(self, op: str, **fields: Any) -> dict[str, Any]:
+        """Send the request `op` with its `fields`, as docs/protocol.md lists them, and return the answer.
+
+        Raises `RequestError` with the server's own text when the server refuses the request, `TimeoutError` when no
+        answer arrives in time, and `ConnectionError` when what answers is not a server of ours.
+        """
+        answer = self._exchange(json.dumps({"op": op, **fields}).encode())
+        if "error" in answer:
+            raise RequestError(answer["error"])
+        return answer
+
+    def _exchange(self, request: bytes) -> dict[str, Any]:
+        with zmq.Context() as context, context.socket(zmq.REQ) as socket:
+            socket.setsockopt(zmq.LINGER, 0)
+            socket.setsockopt(zmq.IPV6, int(":" in self._host))
+            if self._keys is not None:
+                secure_client(socket, self._keys)
+            try:
+                socket.connect(self.address)
+            except zmq.ZMQError as error:
+                raise ConnectionError(f"cannot connect to {self.address}: {error}") from None
+            socket.send(request)
+            if not socket.poll(int(1e3 * self._timeout_s)):
+                raise TimeoutError(f"no server answers at {self.address} within {self._timeout_s:g} s")
+            return self._decoded(socket.recv())
+
+    def _decoded(self, payload: bytes) -> dict[str, Any]:
+        try:
+            answer = json.loads(payload)
+        except ValueError:
+            answer = None
+        if not isinstance(answer, dict):
+            raise ConnectionError(f"what answers at {self.address} is not a server of ManipNet Live")
+        return answer

@@ -1,0 +1,70 @@
+"""How a protocol that sends hands declares itself; `manipnet.outputs.OUTPUTS` lists the declarations.
+
+The command line, the rig file, the counters, the `ready` line and the documentation read them. A module with a
+declaration loads at `--help`, so it imports heavy libraries only inside `open`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from manipnet.common.options import Protocol
+
+if TYPE_CHECKING:
+    from manipnet.net.curve_keys import ServerKeys
+    from manipnet.telemetry import Telemetry
+    from manipnet.wire import HandsMessage
+
+
+@dataclass(frozen=True, slots=True)
+class Emission:
+    """What every output needs of the server."""
+
+    telemetry: "Telemetry"
+    host: str = "127.0.0.1"
+    """The address of this machine to listen on."""
+    keys: "ServerKeys | None" = None
+    """The keys that clients must have where a protocol knows keys."""
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedHands:
+    """A hands message with its two encodings, which every output may use."""
+
+    message: "HandsMessage"
+    msgpack: bytes
+    binary: bytes
+
+
+class HandsOutput:
+    """Sends hands by one protocol, from its creation until `close`. Belongs to the tick thread."""
+
+    address: str | None = None
+    """Where it listens for clients, or None for an output that sends to a configured address."""
+
+    def send(self, hands: EncodedHands) -> bool:
+        """Send one message and return at once; False if it went to nobody. Raises `OSError` if it cannot be sent."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Close the sockets. Does nothing the second time."""
+        raise NotImplementedError
+
+    def connected(self) -> int | None:
+        """The number of clients that are connected, or None for a protocol without connections. From any thread."""
+        return None
+
+
+@dataclass(frozen=True)
+class Output(Protocol):
+    """A protocol that sends hands."""
+
+    open: Callable[[Any, Emission], HandsOutput]
+    """Begin to listen or to send, from an instance of `options`. Raises `ListenError` and `ConfigError`."""
+    topics: tuple[str, ...] = ()
+    """The labels of the counter `messages_out` for each message, if that is not `name`."""
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels of the counter `messages_out`."""
+        return self.topics or (self.name,)

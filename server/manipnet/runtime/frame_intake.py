@@ -1,0 +1,53 @@
+"""From a received frame to the actors: poses that cannot be real are taken out, and every lost frame is counted."""
+
+import logging
+from collections.abc import Sequence
+from typing import Final
+
+from manipnet.actors.actor import Actor
+from manipnet.runtime.flight_recorder import FlightRecorder
+from manipnet.runtime.tick_errors import TickErrors
+from manipnet.telemetry import Telemetry
+from manipnet.tracking.outlier_gate import OutlierGate
+from manipnet.wire.bodies import BodyFrame
+
+_USED = ""
+_BEST_FIRST: Final = (_USED, "duplicate", "other_sender", "late", "time_jump", "internal", "unknown_body")
+"""Outcomes of a frame. Of the outcomes at several actors, the first in this order counts."""
+
+_log = logging.getLogger(__name__)
+
+
+class FrameIntake:
+    """Gives every frame to all actors. Belongs to the tick thread."""
+
+    def __init__(
+        self, actors: Sequence[Actor], recorder: FlightRecorder, errors: TickErrors, telemetry: Telemetry
+    ) -> None:
+        self._actors, self._recorder, self._errors, self._telemetry = actors, recorder, errors, telemetry
+        self._gate = OutlierGate()
+
+    def push(self, frame: BodyFrame) -> None:
+        """Take a frame as it was received."""
+        self._recorder.note(frame)
+        frame, faults = self._gate.check(frame)
+        for fault in faults:
+            self._telemetry.count("bodies_rejected", reason=fault)
+        outcome = min([self._push(actor, frame) for actor in self._actors], key=_BEST_FIRST.index)
+        if outcome != _USED:
+            self._telemetry.count("frames_dropped", reason=outcome)
+        if outcome == "unknown_body":
+            _log.warning("a frame from %s has no body of the rig: %s", frame.source, self._compare(frame))
+
+    def _push(self, actor: Actor, frame: BodyFrame) -> str:
+        try:
+            return actor.push(frame) or _USED
+        except Exception as error:
+            self._errors.report("input", error)
+            return "internal"
+
+    def _compare(self, frame: BodyFrame) -> str:
+        """The bodies that came beside those that are expected, for the person who has to make them match."""
+        received = [str(body.id if body.name is None else body.name) for body in frame.bodies]
+        expected = [str(key) for actor in self._actors for key in actor.expected()]
+        return f"it has {', '.join(received[:8]) or 'no bodies'}; the rig expects {', '.join(expected[:16])}"

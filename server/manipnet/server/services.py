@@ -1,0 +1,66 @@
+"""Everything of a server that listens or sends, and the loop between its ends."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Final
+
+from manipnet.control.service import Control
+from manipnet.inputs import make_receivers, start_receivers
+from manipnet.net.curve_keys import ServerKeys
+from manipnet.outputs import open_outputs
+from manipnet.outputs.declaration import Emission
+from manipnet.outputs.publisher import Publisher
+from manipnet.page.supervisor import LivePage
+from manipnet.recording.recorder import Recorder
+from manipnet.runtime.mesh_watch import MeshWatch
+from manipnet.runtime.prometheus import MetricsPage
+from manipnet.runtime.tick_loop import TickLoop
+from manipnet.server.session import Session
+
+LOOPBACK: Final = "127.0.0.1"
+
+
+@dataclass(frozen=True)
+class Services:
+    """What is open: the tick loop, and the address of every socket by what it carries."""
+
+    loop: TickLoop
+    addresses: dict[str, str]
+
+
+def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) -> Services:
+    """Open every socket; `opened` closes them in reverse order.
+
+    Raises `ListenError`, `ConfigError` and `KeyFileError`.
+    """
+    config, telemetry = session.config, session.telemetry
+    recorder = Recorder(config.takes, session.recording_context, telemetry)
+    opened.callback(recorder.stop)
+    outputs = open_outputs(config.of, Emission(telemetry, config.host, keys))
+    publisher = Publisher(outputs, telemetry, recorder.note)
+    opened.callback(publisher.close)
+    meshes = MeshWatch(session.catalog, session.replace_shape)
+    opened.callback(meshes.stop)
+    meshes.start()
+    control = Control(config.host, config.control_port, {**session.handlers(), **recorder.handlers()}, telemetry, keys)
+    opened.callback(control.stop)
+    control.start()
+    page_host = LOOPBACK if keys is not None else config.host  # browsers have no keys
+    page = LivePage(page_host, config.page_port, control.answer, telemetry)
+    opened.callback(page.stop)
+    page.start()
+    receivers = make_receivers(config.of, session.senders, telemetry, config.host, keys, config.allow)
+    start_receivers(receivers, opened)
+    session.peers.receivers = {declared.title: receiver for declared, receiver in receivers.items()}
+    session.peers.connected = lambda: {**publisher.connected(), "control": control.connected()}
+    addresses = {
+        **publisher.addresses,
+        **{declared.title: receiver.address for declared, receiver in receivers.items()},
+        "control": control.address,
+        "page": page.address,
+    }
+    if config.metrics_port is not None:
+        metrics = MetricsPage(LOOPBACK, config.metrics_port, telemetry)
+        opened.callback(metrics.close)
+        addresses["metrics"] = metrics.address
+    return Services(session.tick_loop(publisher.publish, page), addresses)

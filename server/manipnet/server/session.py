@@ -1,0 +1,101 @@
+"""What a server works with before it listens: the model, the objects, the actors, and their way between threads."""
+
+import secrets
+from collections.abc import Callable
+from contextlib import suppress
+
+from platformdirs import user_log_path
+
+from manipnet import __version__
+from manipnet.actors.actor import Actor
+from manipnet.actors.props import Prop
+from manipnet.config.settings import ActorConfig, ServerConfig
+from manipnet.control.actors_proxy import ActorsProxy
+from manipnet.control.calibration_requests import CalibrationRequests
+from manipnet.control.peers import Peers
+from manipnet.control.request import Handler
+from manipnet.control.session_requests import SessionRequests
+from manipnet.inputs.sender_stats import SenderStats
+from manipnet.recording.recorder import carried_objects
+from manipnet.runtime.flight_recorder import FlightRecorder
+from manipnet.runtime.mailbox import Mailbox
+from manipnet.runtime.object_catalog import ObjectCatalog
+from manipnet.runtime.tick_loop import TickLoop, TickObserver
+from manipnet.runtime.warm_up import pose_a_hand, warm_up
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.synthesizer import Synthesizer
+from manipnet.telemetry import Telemetry
+from manipnet.wire import HandsMessage
+
+WARM_UP_OBJECT = "cube"
+"""The object to warm up with if the rig names none."""
+
+
+class Session:
+    """Loads what is configured, and makes the parts of a server that need it."""
+
+    def __init__(self, config: ServerConfig, wait_for_kernels: Callable[[], object]) -> None:
+        """Raises `BundleError` and `MeshError`. `wait_for_kernels` is called before the first kernel of sensing."""
+        self.config = config
+        self.id = secrets.token_hex(8)
+        self.telemetry = Telemetry()
+        self.catalog = ObjectCatalog(config.objects, config.objects_unit)
+        self.bundle = load_bundle(config.model, config.provider)
+        pose_a_hand(self.bundle, config.solver)
+        wait_for_kernels()
+        self.actors = [self._load_actor(actor) for actor in config.actors]
+        self._mailbox = Mailbox(self.telemetry)
+        self._proxy = ActorsProxy(self.actors, self._mailbox)
+        self.senders = SenderStats(self._mailbox.put)
+        """Where the receivers leave frames."""
+        self.peers = Peers(self.senders)
+        self.telemetry.add_gauges(self.peers.gauges)
+
+    def warm_up(self) -> None:
+        """Run every shape through a tick loop once."""
+        shapes = self.catalog.shapes() or [self.catalog.shape(WARM_UP_OBJECT)]
+        warm_up(self.bundle, shapes, self.config.solver)
+
+    def tick_loop(self, publish: Callable[[HandsMessage], object], observer: TickObserver) -> TickLoop:
+        """The loop from the mailbox to `publish`."""
+        return TickLoop(
+            self.id,
+            self.actors,
+            Synthesizer(self.bundle, self.config.solver, self.telemetry.stages.ended),
+            publish,
+            self._mailbox,
+            FlightRecorder(self.config.dump_dir or user_log_path("manipnet", appauthor=False)),
+            self.telemetry,
+            observer,
+        )
+
+    def handlers(self) -> dict[str, Handler]:
+        """The control requests about this session, one function per operation."""
+        requests = SessionRequests(self.id, self.bundle, self._proxy, self.catalog, self.telemetry).handlers()
+        calibration = CalibrationRequests(self._proxy, self.config.rig).handlers()
+        return {**requests, **calibration, **self.peers.handlers(requests["status"])}
+
+    def replace_shape(self, old: Shape, new: Shape) -> None:
+        """Replace a shape in every prop between two ticks. From any thread; raises `RequestError`."""
+        self._proxy.ask(lambda: [actor.reshape(old, new) for actor in self.actors])
+
+    def recording_context(self) -> tuple[dict[str, str], list[Prop]]:
+        """What a recording depends on: its metadata, and the props whose meshes it keeps. Raises `RequestError`."""
+        props = self._proxy.ask(lambda: [prop for actor in self.actors for prop in actor.props])
+        metadata = {
+            "session": self.id,
+            "version": __version__,
+            "model": self.bundle.name,
+            "model_hash": self.bundle.model_hash,
+            "objects": carried_objects(props),
+        }
+        if self.config.rig is not None:
+            with suppress(OSError, UnicodeDecodeError):  # a rig file that is gone must not prevent a recording
+                metadata["rig"] = self.config.rig.read_text(encoding="utf-8-sig")
+        return metadata, props
+
+    def _load_actor(self, config: ActorConfig) -> Actor:
+        shapes = [(prop.name, self.catalog.load(prop.mesh, prop.unit, prop.scale)) for prop in config.objects]
+        props = [Prop(name, shape.name, shape) for name, shape in shapes]
+        return Actor(config, props, self.bundle, self.telemetry, self.config.look_ahead_s)

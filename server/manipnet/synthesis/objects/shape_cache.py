@@ -1,0 +1,36 @@
+"""Files with the parts of a shape that take long to build: its volume hierarchy and its distance field."""
+
+import logging
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from manipnet.common.atomic_file import replacing
+from manipnet.synthesis.objects.bvh import Bvh
+from manipnet.synthesis.objects.distance_field import Field
+
+_log = logging.getLogger(__name__)
+
+
+def read_cached(path: Path) -> tuple[Bvh, Field] | None:
+    """The parts in a file; None if there is no file or it cannot be read."""
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+            bvh = Bvh(*(data[name] for name in Bvh._fields))
+            return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        _log.warning("shape cache %s is unreadable (%s); building the shape again", path, error)
+        return None
+
+
+def write_cached(path: Path, bvh: Bvh, field: Field) -> None:
+    """Write the parts of a shape, or log why that is not possible."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as file:
+            np.savez(file, **bvh._asdict(), **field._asdict())
+    except OSError as error:
+        _log.warning("shape cache %s cannot be written (%s); the next start builds it again", path, error)
