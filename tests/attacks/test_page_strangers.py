@@ -47,7 +47,9 @@ def get(address: str, path: str = "/", **headers: str) -> http.client.HTTPRespon
 
 def test_the_page_comes_with_a_strict_policy(server: LiveServer) -> None:
     response = get(server.addresses["page"])
-    policy = {part.split()[0]: part.split()[1:] for part in (response.getheader("Content-Security-Policy") or "").split(";")}
+    policy = {
+        part.split()[0]: part.split()[1:] for part in (response.getheader("Content-Security-Policy") or "").split(";")
+    }
     host = urlsplit(server.addresses["page"]).netloc
     assert policy["default-src"] == ["'none'"]
     assert policy["frame-ancestors"] == ["'none'"]
@@ -116,4 +118,7 @@ def test_no_frame_of_a_foreign_page_shows_it(server: LiveServer, chromium: str, 
         # A refused frame shows the browser's own error page, which is of no origin a script may read.
         assert page.evaluate("document.getElementById('it').contentDocument === null")
         frames = page.call("Page.getFrameTree")["frameTree"].get("childFrames", [])
-        assert all(frame["frame"]["url"].startswith("chrome-error:") or frame["frame"].get("unreachableUrl") for frame in frames)
+        assert all(
+            frame["frame"]["url"].startswith("chrome-error:") or frame["frame"].get("unreachableUrl")
+            for frame in frames
+        )

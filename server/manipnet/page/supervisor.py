@@ -39,17 +39,18 @@ RESTART_S: Final = (0.5, 30.0)
 LASTED_S: Final = 60.0
 
 _log = logging.getLogger(__name__)
-Answer = Callable[[list[bytes]], bytes]
+Submit = Callable[[list[bytes], Callable[[bytes], object]], None]
+"""Meets a request, and gives the answer to the function, on any thread."""
 
 
 class LivePage:
     """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry) -> None:
-        """Raises `ListenError`. `answer` meets the page's requests, as it does any client's."""
+    def __init__(self, host: str, port: int, submit: Submit, telemetry: Telemetry) -> None:
+        """Raises `ListenError`. `submit` meets the page's requests, as it does any client's."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._answer, self._telemetry = answer, telemetry
+        self._submit, self._telemetry = submit, telemetry
         self.watched = False
         """Whether a browser is open: only then is there anything to `see`."""
         self._news, self._telling = threading.Condition(), threading.Lock()
@@ -133,7 +134,7 @@ class LivePage:
                 self.watched = content
             elif what == "ask":
                 number, request = content
-                self._tell(ours, "answer", (number, self._answer([request])))
+                self._submit([request], lambda answer, number=number: self._tell(ours, "answer", (number, answer)))
             elif what == "log":
                 _log.log(content[0], "%s", content[1])
 
