@@ -1,4 +1,4 @@
-"""A cut file of the program's own, an output that takes no more, a library that reports home: none of it stops a show."""
+"""Cut files of the program's own, outputs that take no more, and a library that reports home: none stops a show."""
 
 import os
 import shutil
@@ -74,7 +74,8 @@ def test_a_name_that_the_output_cannot_show_ends_nothing(tiny_bundle: Path, tmp_
 def test_a_closed_pipe_leaves_the_log_alive(tiny_bundle: Path, tmp_path: Path) -> None:
     server = start(tmp_path, tiny_bundle)
     wait_ready(server)
-    assert server.stdout is not None and server.stderr is not None
+    assert server.stdout is not None
+    assert server.stderr is not None
     server.stdout.close()
     # Nobody sends bodies: the server says so on standard error a few seconds later, if it still says anything.
     assert server.stderr.readline()

@@ -4,6 +4,7 @@ Operations that may take seconds (a mesh is built, a process starts) run on a th
 never waits for them.
 """
 
+import contextlib
 import json
 import logging
 import queue
@@ -41,11 +42,9 @@ class Dispatcher:
 
     def __init__(self, handlers: Mapping[str, Handler], telemetry: Telemetry) -> None:
         self._handlers, self._telemetry = handlers, telemetry
-        self._waiting: dict[str, queue.Queue[Callable[[], None] | None]] = {
-            name: queue.Queue(MAX_WAITING) for name in dict.fromkeys(SLOW_OPS.values())
-        }
-        for name, waiting in self._waiting.items():
-            threading.Thread(target=_work, args=(waiting,), name=f"control-{name}", daemon=True).start()
+        self._waiting: dict[str, queue.Queue[Callable[[], None] | None]] = {}
+        """The slow requests of each thread that has had any."""
+        self._lock = threading.Lock()
 
     def submit(self, parts: list[bytes], reply: Reply, here: bool = True) -> None:
         """Meet one message, whatever it holds, and give the answer to `reply`: at once, or later for a slow operation.
@@ -70,18 +69,27 @@ class Dispatcher:
             if op not in SLOW_OPS:
                 answer(self._meet(op, request), op)
                 return
-            self._waiting[SLOW_OPS[op]].put_nowait(lambda: answer(self._meet(op, request), op))
+            self._queue(SLOW_OPS[op]).put_nowait(lambda: answer(self._meet(op, request), op))
         except RequestError as error:
             answer({"error": str(error)}, op)
         except queue.Full:
             answer({"error": f"{op} must wait: {MAX_WAITING} requests of its kind are being met; try again later"}, op)
 
     def close(self) -> None:
-        """Let the threads end when they have met what they are at."""
-        for waiting in self._waiting.values():
-            while not waiting.empty():
-                waiting.get_nowait()
-            waiting.put(None)
+        """Let the threads end as soon as they have met the request they are at."""
+        with self._lock:
+            for waiting in self._waiting.values():
+                with contextlib.suppress(queue.Empty):
+                    while True:
+                        waiting.get_nowait()
+                waiting.put(None)
+
+    def _queue(self, name: str) -> "queue.Queue[Callable[[], None] | None]":
+        with self._lock:
+            if name not in self._waiting:
+                self._waiting[name] = queue.Queue(MAX_WAITING)
+                threading.Thread(target=_work, args=(self._waiting[name],), name=f"control-{name}", daemon=True).start()
+            return self._waiting[name]
 
     def _meet(self, op: str, request: Request) -> dict[str, Any]:
         try:

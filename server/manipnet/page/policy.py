@@ -53,7 +53,10 @@ def is_own_page(headers: Any) -> bool:
 
 
 def protect(response: Response, script: str) -> None:
-    """Put `script` into a page and let the browser run it and viser's client, but nothing else. Raises `PolicyError`."""
+    """Put `script` into a page, and let the browser run it and viser's client, but nothing else.
+
+    Raises `PolicyError`.
+    """
     nonce = secrets.token_urlsafe(16)
     page = (response.body or b"").decode("utf-8")
     dataset, module = _LOADER
