@@ -3,8 +3,8 @@
     python examples/own_protocol.py --mesh Box=cube [any option of manipnet-serve]
 
 Each datagram is one frame: a line with the time in seconds, then a line for each body with its name, position (metres)
-and quaternion, separated by spaces. The declaration at the end gives the protocol its flag, its key in rig files and its
-counters. To make it part of the server, put this file into server/manipnet/inputs/ and its declaration into `INPUTS`
+and quaternion, separated by spaces. The declaration at the end gives the protocol its flag, its key in rig files and
+its counters. To make it part of the server, put this file into server/manipnet/inputs/ and its declaration into `INPUTS`
 there; `manipnet doctor` and the tables of the documentation then know it too.
 """
 

@@ -1,6 +1,7 @@
 """`manipnet VERB`: every verb has a help text, works, and reports an error in one line."""
 
 import functools
+import subprocess
 import sys
 from pathlib import Path
 
@@ -38,11 +39,11 @@ def error_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 
 NEEDED = {"train": "torch", "ablate": "torch", "bench": "torch", "quantise": "onnx"}
-"""Packages of the extra `train` without which a verb says how to get them."""
+"""Packages that a verb needs and that the extra `train` installs."""
 
 
 @pytest.mark.parametrize("verb", cli.VERBS)
-def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_verb_has_a_help_text(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     if verb in NEEDED:
         pytest.importorskip(NEEDED[verb])
     with pytest.raises(SystemExit, match="0"):
@@ -61,9 +62,18 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
 
 
-def test_an_unknown_verb_gets_the_list(capsys: pytest.CaptureFixture[str]) -> None:
+HEAVY = {"numba", "numpy", "onnxruntime", "scipy", "torch", "trimesh", "zmq", "ray"}
+
+
+def test_options_load_no_library_that_a_verb_works_with() -> None:
+    script = f"import sys, manipnet_tools.commands.options; print(sorted(sys.modules.keys() & {HEAVY}))"
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_an_unknown_verb_is_refused_with_the_list(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["conjure"]) == 2
-    assert "no verb 'conjure'; verbs are serve, replay" in capsys.readouterr().err
+    assert "there is no verb 'conjure'; the verbs are serve, replay" in capsys.readouterr().err
 
 
 def test_synthesize_writes_both_hands(recording: Path, tiny_bundle: Path, tmp_path: Path) -> None:
@@ -91,7 +101,7 @@ def test_meshes_may_come_before_the_take(recording: Path, capsys: pytest.Capture
     assert "no --mesh" in error_of(capsys, "synthesize", str(recording), "--out", out)
 
 
-def test_what_cannot_be_done_is_one_line(
+def test_an_error_is_one_line(
     recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert error_of(capsys, "replay", "gone", "--to", "tcp://127.0.0.1:1") == "manipnet replay: gone: no such take\n"

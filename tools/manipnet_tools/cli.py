@@ -1,86 +1,90 @@
-"""`manipnet VERB`: one command for everything. Each verb's libraries load only when it is called."""
+"""`manipnet VERB`: one command for everything. The libraries of a verb load only when it is called."""
 
 import importlib
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from manipnet import __version__
 
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb and who does it: `module.main(argv)`, or `module.run(options)` where a class of options is named."""
+    """A verb and the module that does it: `module.run(options)` if there is a class of options, else
+    `module.main(argv)`."""
 
     summary: str
     module: str
     options: str | None = None
+    """Full name of the class of options."""
     examples: tuple[str, ...] = ()
-    """Options and what they do, as `--help` shows them; none for a module that shows its own."""
+    """Options and what they do, printed below `--help`. A module with `main` may print its own instead."""
 
 
+_OPTIONS = "manipnet_tools.commands.options"
 VERBS = {
-    "serve": Verb("fingers live from tracked wrists and props (same as manipnet-serve)", "manipnet.cli"),
+    "serve": Verb("synthesise fingers live from tracked wrists and props (same as manipnet-serve)", "manipnet.cli"),
     "replay": Verb(
-        "send a take to a server, as the tracker would",
+        "send a take to a server, as a tracker would",
         "manipnet_tools.commands.replay",
-        "ReplayOptions",
+        f"{_OPTIONS}.ReplayOptions",
         (
             "takes/mug1 --to tcp://127.0.0.1:5556             to a server on this machine",
-            "take.mcap --to tcp://127.0.0.1:5556 --loop       a recording, over and over",
-            "motive.csv --to osc://127.0.0.1 --speed 0.5      Motive's export, over OSC, slowly",
+            "take.mcap --to tcp://127.0.0.1:5556 --loop       repeat a recording until stopped",
+            "motive.csv --to osc://127.0.0.1 --speed 0.5      an export of Motive, over OSC, at half speed",
         ),
     ),
     "record": Verb(
-        "write what is tracked and synthesised to a recording",
+        "record tracked bodies and synthesised hands",
         "manipnet_tools.commands.record",
-        "RecordOptions",
+        f"{_OPTIONS}.RecordOptions",
         (
             "--out take.mcap                          beside a running server, until Ctrl-C",
-            "--out take.mcap --rig stage.toml         and keep its rig and meshes in the file",
-            "--out take.mcap --bodies-port 5556       without a server: what the tracker sends",
+            "--out take.mcap --rig stage.toml         keep the rig and its meshes in the recording",
+            "--out take.mcap --bodies-port 5556       without a server: the bodies that a tracker sends",
         ),
     ),
     "recover": Verb(
-        "mend a recording that was cut off",
+        "repair a recording that was cut off",
         "manipnet_tools.commands.recover",
-        "RecoverOptions",
-        ("take.mcap --out mended.mcap",),
+        f"{_OPTIONS}.RecoverOptions",
+        ("take.mcap --out repaired.mcap",),
     ),
     "synthesize": Verb(
-        "fingers for a take, offline",
+        "synthesise the fingers of a take offline",
         "manipnet_tools.commands.synthesize",
-        "SynthesizeOptions",
+        f"{_OPTIONS}.SynthesizeOptions",
         (
             "takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz",
             "take.mcap --mesh Box=hammer.obj --out hammer.npz       the same take with another object",
-            "motive.csv --rig stage.toml --out fingers.npz          Motive's export, with the calibration of its rig",
+            "motive.csv --rig stage.toml --out fingers.npz          an export of Motive with a calibrated rig",
         ),
     ),
     "batch": Verb(
-        "fingers for a folder of takes, on all processors or a cluster",
+        "synthesise the fingers of all takes in a folder, on all processors or a cluster",
         "manipnet_tools.batch.command",
-        "BatchOptions",
+        f"{_OPTIONS}.BatchOptions",
         (
             "takes --mesh mug1=mug1.obj --mesh cup1=cup1.obj --out fingers",
             "takes --mesh mug1=mug1.obj --out fingers --ray 192.168.1.7:6379      on a Ray cluster",
         ),
     ),
     "export": Verb(
-        "hands and objects for other programs: BVH, glTF, CSV",
+        "write hands and objects for other programs: BVH, glTF, CSV",
         "manipnet_tools.export.command",
-        "ExportOptions",
+        f"{_OPTIONS}.ExportOptions",
         (
-            "take.mcap --format gltf --out take.glb                     what a recording shows, to see anywhere",
-            "fingers.npz --format bvh --out fingers                     the ManipNet dataset's layout, in a folder",
+            "take.mcap --format gltf --out take.glb                     the hands and objects of a recording",
+            "fingers.npz --format bvh --out fingers                     a folder in the ManipNet dataset's layout",
             "fingers.npz --format bvh --out fingers --right-handed      for Blender and Maya",
             "takes/mug1 --format csv --out mug1.csv                     captured fingers as a table",
         ),
     ),
     "evaluate": Verb(
-        "judge models on captured takes",
+        "compare models with captured takes",
         "manipnet_tools.evaluation.command",
-        "EvaluateOptions",
+        "manipnet_tools.evaluation.command.EvaluateOptions",
         (
             "--data DATASET                                    the shipped model on the last 20 % of every take",
             "--data DATASET --model models/mine --json figures.json",
@@ -89,49 +93,51 @@ VERBS = {
     "train": Verb(
         "train a model on captured takes",
         "manipnet_tools.training.train",
-        "TrainOptions",
+        "manipnet_tools.training.train.TrainOptions",
         ("--data DATASET --out models/mine",),
     ),
     "ablate": Verb(
-        "train and judge the rows of the paper's Table 1",
+        "train and evaluate the rows of the paper's Table 1",
         "manipnet_tools.evaluation.ablate",
-        "AblateOptions",
+        "manipnet_tools.evaluation.ablate.AblateOptions",
         ("--data DATASET --out ablation                both protocols, 49 short trainings",),
     ),
     "quantise": Verb(
-        "write a bundle again with 8-bit weights",
+        "convert a bundle to 8-bit weights",
         "manipnet_tools.training.quantise",
-        "QuantiseOptions",
+        "manipnet_tools.training.quantise.QuantiseOptions",
         ("manipnet-full --out models/manipnet-full-int8",),
     ),
     "bench": Verb(
-        "measure how long a tick takes, stage by stage",
+        "measure how long each stage of a tick takes",
         "manipnet_tools.bench",
         None,
         ("--only tick --seconds 20", "--json figures.json"),
     ),
     "doctor": Verb(
-        "say why no tracked bodies arrive",
+        "find out why no tracked bodies arrive",
         "manipnet_tools.doctor.command",
         None,
         (
             "                                listen where the server would, for 5 s",
-            "--rig stage.toml                and say which of the rig's bodies are missing",
-            "--natnet 192.168.1.5            ask Motive there",
+            "--rig stage.toml                also report which bodies of the rig are missing",
+            "--natnet 192.168.1.5            also ask Motive at this address",
         ),
     ),
-    "rig": Verb("write a rig file from what is heard, or show a configuration", "manipnet_tools.commands.rig"),
+    "rig": Verb(
+        "write a rig file from the bodies that arrive, or print a configuration", "manipnet_tools.commands.rig"
+    ),
     "calibrate": Verb(
         "find where the wrists sit on their bodies, and the size of the hands",
         "manipnet_tools.commands.calibrate",
-        "CalibrateOptions",
+        f"{_OPTIONS}.CalibrateOptions",
         (
-            "--hand-length 0.19                       sheet at the world's origin, beside a running server",
-            "--at 0.4 0.75 0 --yaw 90                 sheet on a table elsewhere",
-            "--reference Box --fingertips             sheet under the tracked box; measure the hand length",
+            "--hand-length 0.19                       beside a running server, the sheet at the world's origin",
+            "--at 0.4 0.75 0 --yaw 90                 the sheet on a table elsewhere",
+            "--reference Box --fingertips             the sheet under the tracked box; measure the hand length",
         ),
     ),
-    "keys": Verb("make and list the keys that let clients in over the network", "manipnet_tools.commands.keys"),
+    "keys": Verb("make and list the keys of clients that connect over the network", "manipnet_tools.commands.keys"),
 }
 
 EXAMPLES = """examples:
@@ -147,11 +153,11 @@ EXAMPLES = """examples:
   manipnet doctor --rig stage.toml"""
 
 EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster"}
-"""Libraries that do not come with a plain installation, and what to install to have them."""
+"""Libraries that a plain installation lacks, and the extra that installs each."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Do what the verb says; the exit status: 0, 1 for what cannot be done, 2 for a mistyped command."""
+    """Run a verb; returns the exit status: 0 for success, 1 for an error, 2 for a mistyped command."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] in ("-h", "--help"):
         print(help_text())
@@ -161,23 +167,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     name, *rest = arguments
     if name not in VERBS:
-        print(f"manipnet: no verb {name!r}; verbs are {', '.join(VERBS)}", file=sys.stderr)
+        print(f"manipnet: there is no verb {name!r}; the verbs are {', '.join(VERBS)}", file=sys.stderr)
         return 2
     return _guarded(name, rest)
 
 
 def help_text() -> str:
-    """What `manipnet --help` prints."""
+    """The text that `manipnet --help` prints."""
     width = max(map(len, VERBS))
     verbs = "\n".join(f"  {name:{width}}  {verb.summary}" for name, verb in VERBS.items())
     return (
-        "usage: manipnet VERB [options]      (manipnet VERB --help: the options of a verb)\n\n"
-        f"Fingers for tracked wrists and props.\n\nverbs:\n{verbs}\n\n{EXAMPLES}"
+        "usage: manipnet VERB [options]      (manipnet VERB --help prints the options of a verb)\n\n"
+        f"Synthesises fingers from tracked wrists and props.\n\nverbs:\n{verbs}\n\n{EXAMPLES}"
     )
 
 
 def _guarded(name: str, rest: list[str]) -> int:
-    """Run a verb; what a user can mend becomes one line instead of a traceback."""
+    """Run a verb; an error that the user can correct is printed as one line instead of a traceback."""
     try:
         return _run(name, VERBS[name], rest)
     except KeyboardInterrupt:
@@ -189,26 +195,31 @@ def _guarded(name: str, rest: list[str]) -> int:
         print(f"manipnet {name}: {remedy}", file=sys.stderr)
     except (ValueError, OSError) as error:
         if isinstance(error, ValueError) and not type(error).__module__.startswith("manipnet"):
-            raise  # a mistake of ours: the traceback is what is needed
+            raise  # a bug of ours, for which the traceback is useful
         print(f"manipnet {name}: {error}", file=sys.stderr)
     return 1
 
 
 def _run(name: str, verb: Verb, rest: list[str]) -> int:
-    module = importlib.import_module(verb.module)
     try:
         if verb.options is None:
-            return module.main(rest) or 0
-        import tyro
-
-        config = (tyro.conf.FlagCreatePairsOff,)
-        options = tyro.cli(getattr(module, verb.options), prog=f"manipnet {name}", args=rest, config=config)
+            return importlib.import_module(verb.module).main(rest) or 0
+        options = _parsed(name, verb.options, rest)
     except SystemExit as end:
         if not end.code and verb.examples:
             print("\nexamples:", *(f"  manipnet {name} {example}" for example in verb.examples), sep="\n")
         raise
-    module.run(options)
+    importlib.import_module(verb.module).run(options)
     return 0
+
+
+def _parsed(name: str, options: str, rest: list[str]) -> Any:
+    """The arguments of a verb as a value of the class `options`."""
+    import tyro
+
+    module, _, kind = options.rpartition(".")
+    kind = getattr(importlib.import_module(module), kind)
+    return tyro.cli(kind, prog=f"manipnet {name}", args=rest, config=(tyro.conf.FlagCreatePairsOff,))
 
 
 if __name__ == "__main__":

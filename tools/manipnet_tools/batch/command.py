@@ -4,21 +4,20 @@ import json
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
 
-import tyro
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet_tools.batch.job import Job, Outcome, keep
 from manipnet_tools.batch.local import run_locally
+from manipnet_tools.commands.options import BatchOptions
 from manipnet_tools.takes.meshes import named_files
 from manipnet_tools.takes.rigged import read_rig
 from manipnet_tools.terminal import open_console
@@ -31,36 +30,6 @@ COLOURS = {"done": "green", "skipped": "dim", "failed": "red"}
 
 class BatchError(ValueError):
     """A batch cannot start, or some of its takes failed; the text names the reason and the remedy."""
-
-
-@dataclass(frozen=True)
-class BatchOptions:
-    """Write the fingers of every take in a folder, as `manipnet synthesize` does for one take.
-
-    Results that are up to date are skipped, so a batch that was stopped continues where it was. A take that fails is
-    reported and does not stop the others.
-    """
-
-    folder: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FOLDER")]
-    """The folder to search for takes, at any depth: folders of BVH files, trajectory texts, Motive CSVs, recordings."""
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")]
-    """The folder for the results: one .npz per take, and summary.json."""
-    mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")] = ()
-    """An object and its mesh in metres, for all takes that have the object; may be given several times. Takes without
-    any use the meshes in their recording, or else those of the rig."""
-    model: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_MODEL
-    """The model: the name of a shipped bundle, or a bundle's folder."""
-    look_ahead: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
-    """How much of the future the synthesis reads from the take, 0 to 0.5; it forecasts the rest."""
-    rig: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The rig file of all takes, which says which body is which, and how each is calibrated. Recordings made beside a
-    server need none."""
-    actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The actor, if the rig has several; by default the first."""
-    jobs: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Number of takes at the same time on this machine; by default one per processor."""
-    ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
-    """Work on a Ray cluster instead: HOST:PORT, auto for the one on this machine, or local to start one here."""
 
 
 def run(options: BatchOptions) -> None:

@@ -2,51 +2,14 @@
 
 import math
 import time
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import tyro
+from typing import Any
 
 from manipnet.common.options import ConfigError
 from manipnet.control.client import ControlClient
+from manipnet_tools.commands.options import CalibrateOptions
 from manipnet_tools.terminal import open_console
 
 ANSWER_S = 10.0
-
-
-@dataclass(frozen=True)
-class CalibrateOptions:
-    """Find where the wrists sit on their tracked bodies, and the size of the hands; see docs/calibration.md.
-
-    Lay both hands flat on the sheet, wrists on the marks and fingers along the lines, and keep still until it is done.
-    """
-
-    server: Annotated[str, tyro.conf.arg(metavar="HOST:PORT")] = "127.0.0.1:5557"
-    """Address of the server's control port."""
-    actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The actor to calibrate, if there are several."""
-    hand: Literal["both", "left", "right"] = "both"
-    """The hand that lies on the sheet."""
-    hand_length: Annotated[float | None, tyro.conf.arg(metavar="METRES")] = None
-    """Length from the middle of the wrist to the tip of the middle finger, read off the sheet's ruler."""
-    fingertips: bool = False
-    """Measure the hand length instead: draw the hands back until the middle fingertips touch the sheet's centre
-    line."""
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """The sheet's centre in the world, metres (x y z; y is the height of the table)."""
-    yaw: Annotated[float, tyro.conf.arg(metavar="DEGREES")] = 0.0
-    """Rotation of the sheet about the vertical, counter-clockwise as seen from above."""
-    reference: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """Instead of --at: a prop of the rig that stands on the sheet's centre with its x axis to the operator's right."""
-    countdown: Annotated[int, tyro.conf.arg(metavar="SECONDS")] = 5
-    """Time to lay down the hands."""
-    seconds: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = 2.0
-    """How long the hands must lie still."""
-    dry_run: bool = False
-    """Do not change the rig file; the calibration lasts until the server stops."""
-    keys: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The client's key file, for a server that requires keys (`manipnet keys make NAME`)."""
 
 
 def run(options: CalibrateOptions) -> None:

@@ -4,12 +4,10 @@ import base64
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import tyro
 import zmq
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
@@ -27,38 +25,12 @@ from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_MSGPACK, HandsMessage, decode_msgpack
 from manipnet.wire.bodies import MessageError
+from manipnet_tools.commands.options import RecordOptions
 from manipnet_tools.terminal import open_console
 
 HANDS_PORT = 5555
 ANSWER_S = 3.0
 POLL_MS = 50
-
-
-@dataclass(frozen=True)
-class RecordOptions:
-    """Record until Ctrl-C, or for --seconds.
-
-    Beside a running server: its hands and, at 60 Hz, the bodies from which they were synthesised.
-
-    Without a server (--bodies-port): the bodies that a tracker sends to this machine, at the tracker's rate.
-    """
-
-    out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
-    """The file to write, .mcap; it must not exist."""
-    server: Annotated[str, tyro.conf.arg(metavar="HOST:PORT")] = "127.0.0.1:5555"
-    """Address of the server's hands."""
-    bodies_port: Annotated[int | None, tyro.conf.arg(metavar="PORT")] = None
-    """Record without a server: listen on this port for senders of bodies over ZeroMQ."""
-    control: Annotated[str, tyro.conf.arg(metavar="HOST:PORT")] = "127.0.0.1:5557"
-    """Address of the server's control port, which names the model and sends the meshes."""
-    actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The actor whose bodies are recorded, if there are several; by default the first one heard."""
-    rig: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The server's rig file; the recording keeps it and its meshes."""
-    keys: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The client's key file, for a server that requires keys."""
-    seconds: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
-    """Stop after this time."""
 
 
 def run(options: RecordOptions) -> None:

@@ -2,12 +2,8 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
 from numpy.typing import NDArray
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -17,28 +13,13 @@ from manipnet.geometry import Array, quat_slerp
 from manipnet.inputs.playback import BodySender, Played, looped, play
 from manipnet.runtime.signals import stop_on_signals
 from manipnet.wire.bodies import BodyFrame, BodySample
+from manipnet_tools.commands.options import ReplayOptions
 from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
 from manipnet_tools.terminal import open_console
 
 RATES_HZ = (1.0, 1000.0)
 SPEEDS = (0.01, 100.0)
 SHOW_S = 0.2
-
-
-@dataclass(frozen=True)
-class ReplayOptions:
-    """Stream a take to a running server."""
-
-    take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
-    """The take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
-    to: Annotated[str, tyro.conf.arg(metavar="tcp://HOST:PORT|osc://HOST:PORT")]
-    """Where to send it: the server's --input-port over ZeroMQ (tcp://) or its --osc-port (osc://)."""
-    speed: Annotated[float, tyro.conf.arg(metavar="TIMES")] = 1.0
-    """Play this many times as fast. The time stamps remain those of the take."""
-    loop: bool = False
-    """Repeat until stopped; the time stamps keep rising."""
-    rate: Annotated[float | None, tyro.conf.arg(metavar="HZ")] = None
-    """Resample to this rate; by default the take keeps its own."""
 
 
 def run(options: ReplayOptions) -> None:

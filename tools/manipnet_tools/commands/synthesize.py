@@ -1,48 +1,25 @@
 """`manipnet synthesize`: fingers for a take, made offline by the synthesis of the live server."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Annotated, Any
+from typing import IO, Any
 
 import numpy as np
-import tyro
 from rich.progress import Progress
 
 from manipnet.config.settings import WRISTS
 from manipnet.geometry import Array
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Synthesizer, hand_to_world
+from manipnet_tools.commands.options import SynthesizeOptions
 from manipnet_tools.takes.meshes import MeshFile, named_files, recorded_meshes
 from manipnet_tools.takes.rigged import RigText, read_rig, read_rigged
 from manipnet_tools.takes.rollout import Ticks, hand_inputs, roll_out, tick_take
 from manipnet_tools.takes.take import Take, TakeError
 from manipnet_tools.terminal import open_console
-
-
-@dataclass(frozen=True)
-class SynthesizeOptions:
-    """Write the fingers of both hands of a take to a file, in world coordinates at 60 Hz."""
-
-    take: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="TAKE")]
-    """The take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
-    mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")]
-    """An object that the hands touch, and its mesh in metres; may be given several times. By default the meshes in the
-    recording, or else those of the rig."""
-    out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
-    """The file to write, .npz."""
-    model: Annotated[str, tyro.conf.arg(metavar="NAME")] = DEFAULT_MODEL
-    """The model: the name of a shipped bundle, or a bundle's folder."""
-    look_ahead: Annotated[float, tyro.conf.arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
-    """How much of the future the synthesis reads from the take, 0 to 0.5; it forecasts the rest."""
-    rig: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The rig file that says which body is which, and how each is calibrated. A recording made beside a server, or with
-    --rig, needs none."""
-    actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The actor, if the rig has several; by default the first."""
 
 
 def run(options: SynthesizeOptions) -> None:

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from rich.console import Console
 from rich.progress import Progress
 
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
@@ -20,6 +19,7 @@ from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import data_folders, load_cases
 from manipnet_tools.evaluation.results import Fold, Protocol
 from manipnet_tools.evaluation.roll_outs import evaluate, folds
+from manipnet_tools.terminal import open_console
 from manipnet_tools.training.dataset import HandTrack, load_tracks
 from manipnet_tools.training.train import Learner, Lessons, TrainConfig, save_bundle, trained
 
@@ -63,7 +63,7 @@ class AblateOptions:
 
 def run(options: AblateOptions) -> None:
     """Train what is missing, evaluate every row, print and write the figures. Raises `DataError`."""
-    console = Console()
+    console = open_console(stderr=False)
     cases = load_cases(options.data)
     names = [folder.name for folder in data_folders(options.data)]
     tracks = load_tracks(options.data)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -21,6 +20,7 @@ from manipnet_tools.evaluation.results import (
     row_name,
 )
 from manipnet_tools.evaluation.roll_outs import evaluate, folds
+from manipnet_tools.terminal import open_console
 
 Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
 
@@ -52,7 +52,7 @@ class EvaluateOptions:
 
 def run(options: EvaluateOptions) -> None:
     """Evaluate, print the tables, write what was asked for. Raises `DataError` and `BundleError`."""
-    console = Console()
+    console = open_console(stderr=False)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
         if options.sweep:

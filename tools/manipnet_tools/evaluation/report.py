@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
 
 from manipnet_tools.evaluation.scoring import TARGETS, Score
 from manipnet_tools.takes.rollout import SIDES
@@ -67,7 +68,7 @@ def _verdicts(results: "Results", ours: str) -> Table:
         "target", "bound", ours, "verdict", title=f"{results.protocol}: targets", title_justify="left", box=SIMPLE_HEAD
     )
     for verdict in verdicts(results, ours):
-        met = "[green]met[/green]" if verdict["met"] else "[red]missed[/red]"
+        met = Text("met", "green") if verdict["met"] else Text("missed", "red")
         table.add_row(verdict["text"], verdict["target"], f"{verdict['value']:.3f}", met)
     return table
 

@@ -1,12 +1,7 @@
 """`manipnet export`: writes hands and objects for other programs."""
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Literal
-
-import tyro
-
 from manipnet.synthesis.objects.mesh import load_mesh
+from manipnet_tools.commands.options import ExportOptions
 from manipnet_tools.export.animation import Animation, ExportError, read_animation, with_meshes
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
@@ -15,28 +10,6 @@ from manipnet_tools.takes.meshes import named_files
 from manipnet_tools.terminal import open_console
 
 SUFFIXES = {"gltf": (".glb", ".gltf"), "csv": (".csv",)}
-
-
-@dataclass(frozen=True)
-class ExportOptions:
-    """Write hands and objects for other programs.
-
-    bvh: a folder with one file per hand and object, the ManipNet dataset's skeleton. gltf: one file with skinned hands,
-    objects and their animation. csv: one table.
-    """
-
-    source: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RECORDING|NPZ|TAKE")]
-    """A recording with hands, a file of `manipnet synthesize`, or a captured take (folder of BVH files)."""
-    format: Literal["bvh", "gltf", "csv"]
-    """The format to write."""
-    out: Annotated[Path, tyro.conf.arg(metavar="PATH")]
-    """The file to write (.glb, .gltf or .csv), or for bvh the folder."""
-    mesh: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="NAME=FILE")] = ()
-    """gltf: the mesh of an object, in metres, if the source does not hold it; may be given several times."""
-    actor: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
-    """The actor whose hands to write, if a recording has several; by default the first."""
-    right_handed: bool = False
-    """bvh: write right-handed centimetres, for Blender and Maya, instead of the dataset's left-handed decimetres."""
 
 
 def run(options: ExportOptions) -> None:

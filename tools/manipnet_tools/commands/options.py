@@ -1,0 +1,173 @@
+"""Options of the verbs that work with takes and servers.
+
+They are apart from the verbs, whose libraries take a second to load, so that `--help` is quick.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
+
+
+def _optional(metavar: str) -> Any:
+    """An argument whose default None is not shown, because its help says what happens without it."""
+    return arg(metavar=metavar, help_behavior_hint="")
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """Stream a take to a running server."""
+
+    take: Annotated[Positional[Path], arg(metavar="TAKE")]
+    """The take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
+    to: Annotated[str, arg(metavar="tcp://HOST:PORT|osc://HOST:PORT")]
+    """Where to send it: the server's --input-port over ZeroMQ (tcp://) or its --osc-port (osc://)."""
+    speed: Annotated[float, arg(metavar="TIMES")] = 1.0
+    """Play this many times as fast. The time stamps remain those of the take."""
+    loop: bool = False
+    """Repeat until stopped; the time stamps keep rising."""
+    rate: Annotated[float | None, _optional("HZ")] = None
+    """Resample to this rate; by default the take keeps its own."""
+
+
+@dataclass(frozen=True)
+class RecordOptions:
+    """Record until Ctrl-C, or for --seconds.
+
+    Beside a running server: its hands and, at 60 Hz, the bodies from which they were synthesised.
+
+    Without a server (--bodies-port): the bodies that a tracker sends to this machine, at the tracker's rate.
+    """
+
+    out: Annotated[Path, arg(metavar="FILE")]
+    """The file to write, .mcap; it must not exist."""
+    server: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:5555"
+    """Address of the server's hands."""
+    bodies_port: Annotated[int | None, _optional("PORT")] = None
+    """Record without a server: listen on this port for senders of bodies over ZeroMQ."""
+    control: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:5557"
+    """Address of the server's control port, which names the model and sends the meshes."""
+    actor: Annotated[str | None, _optional("NAME")] = None
+    """The actor whose bodies are recorded, if there are several; by default the first one heard."""
+    rig: Annotated[Path | None, _optional("FILE")] = None
+    """The server's rig file; the recording keeps it and its meshes."""
+    keys: Annotated[Path | None, _optional("FILE")] = None
+    """The client's key file, for a server that requires keys."""
+    seconds: Annotated[float | None, _optional("SECONDS")] = None
+    """Stop after this time."""
+
+
+@dataclass(frozen=True)
+class RecoverOptions:
+    """Repair a recording that has no end, for example after a crash or a power cut. The file itself is not changed."""
+
+    recording: Annotated[Positional[Path], arg(metavar="RECORDING")]
+    """The recording to read."""
+    out: Annotated[Path, arg(metavar="FILE")]
+    """The file to write; it must not exist."""
+
+
+@dataclass(frozen=True)
+class SynthesizeOptions:
+    """Write the fingers of both hands of a take to a file, in world coordinates at 60 Hz."""
+
+    take: Annotated[Positional[Path], arg(metavar="TAKE")]
+    """The take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
+    out: Annotated[Path, arg(metavar="FILE")]
+    """The file to write, .npz."""
+    mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
+    """An object and its mesh in metres; by default the meshes in the recording, or else those of the rig."""
+    model: Annotated[str, arg(metavar="NAME")] = DEFAULT_MODEL
+    """The model: the name of a shipped bundle, or a bundle's folder."""
+    look_ahead: Annotated[float, arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
+    """How much of the future the synthesis reads from the take, 0 to 0.5; it forecasts the rest."""
+    rig: Annotated[Path | None, _optional("FILE")] = None
+    """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
+    actor: Annotated[str | None, _optional("NAME")] = None
+    """The actor, if the rig has several; by default the first."""
+
+
+@dataclass(frozen=True)
+class BatchOptions:
+    """Write the fingers of every take in a folder, as `manipnet synthesize` does for one take.
+
+    Results that are up to date are skipped, so a batch that was stopped continues where it was. A take that fails is
+    reported and does not stop the others.
+    """
+
+    folder: Annotated[Positional[Path], arg(metavar="FOLDER")]
+    """The folder to search for takes, at any depth: folders of BVH files, trajectory texts, Motive CSVs, recordings."""
+    out: Annotated[Path, arg(metavar="DIR")]
+    """The folder for the results: one .npz per take, and summary.json."""
+    mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
+    """An object and its mesh in metres; by default the meshes in each recording, or else those of the rig."""
+    model: Annotated[str, arg(metavar="NAME")] = DEFAULT_MODEL
+    """The model: the name of a shipped bundle, or a bundle's folder."""
+    look_ahead: Annotated[float, arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
+    """How much of the future the synthesis reads from the take, 0 to 0.5; it forecasts the rest."""
+    rig: Annotated[Path | None, _optional("FILE")] = None
+    """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
+    actor: Annotated[str | None, _optional("NAME")] = None
+    """The actor, if the rig has several; by default the first."""
+    jobs: Annotated[int | None, _optional("N")] = None
+    """Number of takes at the same time on this machine; by default one per processor."""
+    ray: Annotated[str | None, _optional("ADDRESS")] = None
+    """Work on a Ray cluster instead: HOST:PORT, auto for the one on this machine, or local to start one here."""
+
+
+@dataclass(frozen=True)
+class ExportOptions:
+    """Write hands and objects for other programs.
+
+    bvh: a folder with one file per hand and object, the ManipNet dataset's skeleton. gltf: one file with skinned hands,
+    objects and their animation. csv: one table.
+    """
+
+    source: Annotated[Positional[Path], arg(metavar="RECORDING|NPZ|TAKE")]
+    """A recording with hands, a file of `manipnet synthesize`, or a captured take (folder of BVH files)."""
+    format: Literal["bvh", "gltf", "csv"]
+    """The format to write."""
+    out: Annotated[Path, arg(metavar="PATH")]
+    """The file to write (.glb, .gltf or .csv), or for bvh the folder."""
+    mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
+    """gltf: the mesh of an object, in metres, if the source does not hold it."""
+    actor: Annotated[str | None, _optional("NAME")] = None
+    """The actor whose hands to write, if a recording has several; by default the first."""
+    right_handed: bool = False
+    """bvh: write right-handed centimetres, for Blender and Maya, instead of the dataset's left-handed decimetres."""
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """Find where the wrists sit on their tracked bodies, and the size of the hands; see docs/calibration.md.
+
+    Lay both hands flat on the sheet, wrists on the marks and fingers along the lines, and keep still until it is done.
+    """
+
+    server: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:5557"
+    """Address of the server's control port."""
+    actor: Annotated[str | None, _optional("NAME")] = None
+    """The actor to calibrate, if there are several."""
+    hand: Literal["both", "left", "right"] = "both"
+    """The hand that lies on the sheet."""
+    hand_length: Annotated[float | None, _optional("METRES")] = None
+    """Length from the middle of the wrist to the tip of the middle finger, read off the sheet's ruler."""
+    fingertips: bool = False
+    """Measure the hand length: the hands are drawn back until the middle fingertips touch the sheet's centre line."""
+    at: Annotated[tuple[float, float, float], arg(metavar="X Y Z")] = (0.0, 0.0, 0.0)
+    """The sheet's centre in the world, metres; Y is the height of the table."""
+    yaw: Annotated[float, arg(metavar="DEGREES")] = 0.0
+    """Rotation of the sheet about the vertical, counter-clockwise as seen from above."""
+    reference: Annotated[str | None, _optional("NAME")] = None
+    """Instead of --at: a prop of the rig that stands on the sheet's centre with its x axis to the operator's right."""
+    countdown: Annotated[int, arg(metavar="SECONDS")] = 5
+    """Time to lay down the hands."""
+    seconds: Annotated[float, arg(metavar="SECONDS")] = 2.0
+    """How long the hands must lie still."""
+    dry_run: bool = False
+    """Do not change the rig file; the calibration lasts until the server stops."""
+    keys: Annotated[Path | None, _optional("FILE")] = None
+    """The client's key file, for a server that requires keys (`manipnet keys make NAME`)."""
