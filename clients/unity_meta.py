@@ -1,7 +1,7 @@
-"""Write the `.meta` file that Unity wants beside every asset of the package, each with a GUID that never changes.
+"""Write the `.meta` file that Unity requires beside every asset of the package.
 
-Run `python clients/unity_meta.py` after adding or moving a file. A GUID is made from the path, so references to a file
-survive whoever writes its meta file.
+Run `python clients/unity_meta.py` after adding or moving a file. The GUID in it is made from the asset's path, so it
+never changes and references to the asset stay valid.
 """
 
 import hashlib
@@ -13,7 +13,7 @@ IMPORTERS |= {"package.json": "PackageManifestImporter", ".png": "TextureImporte
 
 
 def files(package: Path) -> dict[Path, str]:
-    """Every meta file with its text. A folder whose name ends in ~ is invisible to Unity, what is in it is not."""
+    """Every meta file with its text. Unity ignores a folder whose name ends in ~, but not the assets in it."""
     assets = [path for path in sorted(package.rglob("*")) if path.suffix != ".meta" and not path.name.endswith("~")]
     return {path.with_name(path.name + ".meta"): _meta(path, package) for path in assets}
 

@@ -1,5 +1,6 @@
 """Memory, descriptors and threads of processes, read from /proc (Linux)."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,5 +39,6 @@ def _fields(path: Path) -> dict[str, int]:
 def _descendants(pid: int) -> list[int]:
     children: list[int] = []
     for task in (Path("/proc") / str(pid) / "task").iterdir():
-        children += [int(word) for word in (task / "children").read_text(encoding="ascii").split()]
+        with suppress(FileNotFoundError):  # the thread has just ended
+            children += [int(word) for word in (task / "children").read_text(encoding="ascii").split()]
     return children + [grandchild for child in children for grandchild in _descendants(child)]

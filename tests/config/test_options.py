@@ -28,7 +28,7 @@ from manipnet.common.options import (
     to_toml,
 )
 from manipnet.config.settings import SOLVERS, ServerConfig, all_options, protocol_options
-from manipnet.synthesis.ik.pose import SOLVERS as SOLVERS_THERE_ARE
+from manipnet.synthesis.ik.pose import SOLVERS as EXISTING_SOLVERS
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def test_no_two_options_have_the_same_key() -> None:
     assert len(declared) == len(set(declared)) == len(all_options())
 
 
-def test_the_other_fields_of_a_configuration_are_no_choices_of_a_user() -> None:
+def test_every_other_field_of_a_configuration_is_known() -> None:
     others = set(ServerConfig.__slots__) - {each.field for each in options_of(ServerConfig)}
     assert others == {"actors", "protocols", "rig"}
 
@@ -157,8 +157,8 @@ def test_the_help_has_every_option_with_its_default(capsys: pytest.CaptureFixtur
         assert f"{each.help} (default: {each.shown_default})" in text or not each.shown_default
 
 
-def test_the_solvers_are_those_there_are() -> None:
-    assert SOLVERS == SOLVERS_THERE_ARE
+def test_the_solvers_are_those_that_exist() -> None:
+    assert SOLVERS == EXISTING_SOLVERS
 
 
 HEAVY = {

@@ -1,4 +1,4 @@
-"""Rig files and options: what is understood, and what every mistake is answered with."""
+"""Rig files and the command line: what they mean, and the error of each mistake."""
 
 from contextlib import suppress
 from ipaddress import ip_network
@@ -182,13 +182,13 @@ def test_any_text_is_read_or_refused_with_our_own_error(text: str, tmp_path_fact
         ({"actors": (default_actor((parse_object("left_wrist=x.obj"),)),)}, "two parts named 'left_wrist'"),
     ],
 )
-def test_what_makes_no_sense_is_refused(change: dict, complaint: str) -> None:
+def test_a_configuration_that_cannot_be_served_is_refused(change: dict, complaint: str) -> None:
     with pytest.raises(ConfigError) as error:
         check(ServerConfig(**({"actors": (default_actor(),)} | change)))
     assert complaint in str(error.value)
 
 
-def test_other_machines_are_let_in_only_when_asked_to() -> None:
+def test_other_machines_may_connect_only_if_it_is_asked_for() -> None:
     check(ServerConfig((default_actor(),), host="0.0.0.0", insecure=True))
     keys, allow = Path("keys"), (ip_network("192.168.1.0/24"),)
     check(ServerConfig((default_actor(),), host="0.0.0.0", keys=keys, allow=allow))

@@ -1,4 +1,4 @@
-"""Rig files written: a configuration survives being printed and read, and a calibration changes nothing else."""
+"""Written rig files: a configuration survives being printed and read, and a calibration changes nothing else."""
 
 from dataclasses import fields, replace
 from ipaddress import ip_network
@@ -239,7 +239,10 @@ def test_line_ends_and_permissions_stay(tmp_path: Path) -> None:
     [
         (lambda path: path.unlink(), "No such file"),
         (lambda path: path.write_text("[bodies\n"), "could not be changed"),
-        (lambda path: path.write_text('[[actors]]\nname = "x"\nbodies.left_wrist = 1\n'), "no actor 'actor' any more"),
+        (
+            lambda path: path.write_text('[[actors]]\nname = "x"\nbodies.left_wrist = 1\n'),
+            "no longer has an actor 'actor'",
+        ),
         (
             lambda path: path.write_text('[bodies]\nleft_wrist = 1\nright_wrist = 2\n[[objects]]\nbody = "B"\n'),
             "object",
@@ -247,7 +250,9 @@ def test_line_ends_and_permissions_stay(tmp_path: Path) -> None:
         (lambda path: path.write_bytes(b"\xff\xfe"), "could not be changed"),
     ],
 )
-def test_a_file_that_cannot_be_changed_stays_and_the_lines_are_told(spoil, reason: str, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_changed_stays_as_it_is_and_the_lines_to_add_are_shown(
+    spoil, reason: str, tmp_path: Path
+) -> None:
     path = tmp_path / "rig.toml"
     path.write_text(FILES["plain"], encoding="utf-8")
     actor = calibrated(path)

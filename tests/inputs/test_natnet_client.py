@@ -30,7 +30,7 @@ def client_of(heard, telemetry, host, port=COMMAND_PORT, allow=(), **options):
 
 @pytest.fixture(autouse=True)
 def _hurry(monkeypatch):
-    """Chores that are done every second in life are done ten times as often here."""
+    """What the client does every second, it does ten times as often here."""
     for period in ("CONNECT_S", "KEEP_ALIVE_S", "ECHO_S"):
         monkeypatch.setattr(natnet_client, period, 0.1)
 
@@ -54,12 +54,12 @@ def connect(heard, telemetry):
 
 @pytest.fixture
 def warnings():
-    """What the client warns of; it does so once a problem is in its status."""
-    said = queue.Queue()
+    """The warnings of the client, which come once a problem is in its status."""
+    warnings = queue.Queue()
     log, handler = logging.getLogger(natnet_client.__name__), logging.Handler(logging.WARNING)
-    handler.emit = lambda record: said.put(record.getMessage())
+    handler.emit = lambda record: warnings.put(record.getMessage())
     log.addHandler(handler)
-    yield said
+    yield warnings
     log.removeHandler(handler)
 
 
@@ -115,7 +115,7 @@ def test_z_up_becomes_y_up(connect, heard):
 
 
 def stream_until_named(motive, heard, name):
-    """Frames until the definitions, which travel on their own, have reached the client."""
+    """Send frames until the definitions, which are sent separately, have reached the client."""
     for number in itertools.count():
         motive.send(write(motive.version, number))
         frame = heard.next()
@@ -124,7 +124,7 @@ def stream_until_named(motive, heard, name):
             return
 
 
-def test_names_are_asked_for_again_when_the_frame_says_so(connect, heard):
+def test_names_are_requested_again_when_a_frame_asks_for_it(connect, heard):
     with FakeMotive(names={1: "old"}) as motive:
         connect(motive)
         motive.wait_for(12)
@@ -196,24 +196,24 @@ def test_multicast(connect, heard):
 
 
 @pytest.mark.parametrize(
-    ("options", "info", "says"),
+    ("options", "info", "expected"),
     [
         ({}, server_info(group="239.255.42.99"), "start with --multicast, or choose Unicast"),
-        ({}, server_info(version=(2, 9)), "speaks NatNet 2.9; 3.0"),
-        ({}, server_info(version=(5, 1)), "speaks NatNet 5.1; 3.0"),
+        ({}, server_info(version=(2, 9)), "speaks NatNet 2.9, and this program understands 3.0"),
+        ({}, server_info(version=(5, 1)), "speaks NatNet 5.1, and this program understands 3.0"),
         ({"multicast": True}, server_info(group="10.0.0.1"), "cannot join multicast 10.0.0.1:1511"),
     ],
 )
-def test_what_is_wrong_is_said_once_with_the_remedy_and_stays_said(connect, warnings, options, info, says):
+def test_a_problem_is_logged_once_with_its_remedy_and_stays_in_the_status(connect, warnings, options, info, expected):
     with FakeMotive(info=info) as motive:
         client = connect(motive, **options)
-        assert says in warnings.get(timeout=20)
+        assert expected in warnings.get(timeout=20)
         seen = set()
         for answers in range(2, 6):
             motive.wait_for(0, answers)
             seen.add(client.status()["problem"])
     assert len(seen) == 1
-    assert says in seen.pop()
+    assert expected in seen.pop()
     assert warnings.empty()
 
 
@@ -242,7 +242,7 @@ def test_good_frame_after_garbage(connect, heard, telemetry, garbage, reason):
     assert telemetry.counts()["frames_dropped"] == {reason: 1}
 
 
-def test_packets_of_no_interest_are_passed_over(connect, heard, telemetry):
+def test_other_packets_are_ignored(connect, heard, telemetry):
     with FakeMotive() as motive:
         connect(motive)
         motive.wait_for(4)
@@ -280,7 +280,7 @@ def test_frames_may_come_from_listed_networks_but_answers_only_from_the_server(c
     assert "frames_dropped" not in telemetry.counts()
 
 
-def test_a_frame_tells_when_it_was_captured_on_our_clock(connect, heard):
+def test_the_capture_time_of_a_frame_is_known_on_our_clock(connect, heard):
     with FakeMotive() as motive:
         client = connect(motive)
         motive.wait_for(12)
@@ -293,7 +293,7 @@ def test_a_frame_tells_when_it_was_captured_on_our_clock(connect, heard):
         assert captured_s < frame.t_received_s
 
 
-def test_frames_before_the_version_is_known_are_not_guessed_at(heard, telemetry):
+def test_frames_before_the_version_is_known_are_dropped(heard, telemetry):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as motive:
         motive.bind(("127.0.0.1", 0))
         client = client_of(heard, telemetry, *motive.getsockname())
@@ -307,7 +307,7 @@ def test_frames_before_the_version_is_known_are_not_guessed_at(heard, telemetry)
     assert telemetry.counts()["frames_dropped"] == {"unsupported": 1}
 
 
-def test_bad_pose_of_one_body_spares_the_others(connect, heard):
+def test_a_bad_pose_of_one_body_does_not_affect_the_others(connect, heard):
     with FakeMotive() as motive:
         connect(motive)
         motive.wait_for(4)
@@ -316,14 +316,14 @@ def test_bad_pose_of_one_body_spares_the_others(connect, heard):
 
 
 @pytest.mark.parametrize(
-    ("host", "options", "says"),
+    ("host", "options", "expected"),
     [
         ("no-such-host.invalid", {}, "cannot find the NatNet server 'no-such-host.invalid'"),
         ("127.0.0.1", {"interface": "203.0.113.9"}, "203.0.113.9:0: Cannot assign requested address"),
     ],
 )
-def test_wrong_places_are_named(heard, telemetry, host, options, says):
-    with pytest.raises(ListenError, match=says):
+def test_a_wrong_host_or_interface_is_named(heard, telemetry, host, options, expected):
+    with pytest.raises(ListenError, match=expected):
         client_of(heard, telemetry, host, **options).start()
 
 

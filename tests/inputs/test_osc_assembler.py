@@ -1,4 +1,4 @@
-"""Addresses in the wild and the grouping of messages into frames, with arrival times given by hand."""
+"""OSC addresses that senders use, and the assembly of messages into frames, with arrival times given by the test."""
 
 import math
 
@@ -18,7 +18,7 @@ P, Q = (0.5, 1.0, -2.0), (0.0, 0.6, 0.0, 0.8)
 
 
 def play(*datagrams, times=None):
-    """The frames of datagrams that arrive 0.1 ms apart from 100 s on, and of the silence afterwards."""
+    """The frames of datagrams that arrive 0.1 ms apart, beginning at 100 s, and are followed by silence."""
     assembler = FrameAssembler("osc:test")
     times = times or [100 + 1e-4 * n for n in range(len(datagrams))]
     frames = []
@@ -121,16 +121,16 @@ def test_every_pattern_gives_its_pose(datagrams, key, p, q, tracked):
         osc("/"),
     ],
 )
-def test_other_peoples_messages_are_passed_over(datagram):
+def test_messages_with_other_addresses_are_ignored(datagram):
     frames, ours = FrameAssembler("osc:test").add(split_packet(datagram), 0.0)
     assert not frames
     assert not ours
 
 
 @pytest.mark.parametrize(
-    ("datagram", "says"),
+    ("datagram", "expected"),
     [
-        (body(7, "position", 1.0, 2.0), "2 arguments; 3 numbers"),
+        (body(7, "position", 1.0, 2.0), "2 arguments; it must have 3 numbers"),
         (body(7, "quat", 1.0, 2.0, 3.0, "w"), "4 numbers"),
         (osc("/VMC/Ext/Tra/Pos", *P, *Q), "must be a name or an integer"),
         (osc("/VMC/Ext/Tra/Pos"), "no arguments"),
@@ -142,9 +142,9 @@ def test_other_peoples_messages_are_passed_over(datagram):
         (osc("/frame/start", "x"), "1 numbers"),
     ],
 )
-def test_wrong_messages_for_us_are_named_and_a_good_one_follows(datagram, says):
+def test_wrong_messages_are_named_and_a_good_one_follows(datagram, expected):
     assembler = FrameAssembler("osc:test")
-    with pytest.raises(MessageError, match=says):
+    with pytest.raises(MessageError, match=expected):
         assembler.add(split_packet(datagram), 0.0)
     assert names(assembler.add(split_packet(bundle(pose(1), pose(2))), 0.1)[0]) == [[1, 2]]
 
@@ -226,7 +226,7 @@ def test_loose_frames_without_times_have_the_time_of_their_first_message(rate_hz
     assert [frame.t_received_s for frame in frames] == pytest.approx([n / rate_hz + 0.0004 for n in range(20)])
 
 
-def test_a_frame_that_lost_its_time_stamp_is_left_out_and_counted():
+def test_a_frame_that_lost_its_time_stamp_is_dropped_and_counted():
     assembler = FrameAssembler("osc:test")
     whole = [start(1), stamp(1.0), pose(1), end(1)]
     for datagram in [*whole, start(2), pose(1), end(2), *whole]:
@@ -234,7 +234,7 @@ def test_a_frame_that_lost_its_time_stamp_is_left_out_and_counted():
     assert assembler.incomplete == 1
 
 
-def test_a_sender_that_stops_giving_times_is_believed_after_a_while():
+def test_a_sender_that_stops_giving_times_is_accepted_after_a_while():
     assembler = FrameAssembler("osc:test")
     assembler.add(split_packet(bundle(stamp(1.0), pose(1))), 50.0)
     timeless = split_packet(bundle(pose(1), pose(2)))
@@ -243,7 +243,7 @@ def test_a_sender_that_stops_giving_times_is_believed_after_a_while():
     assert frames[-1][0].t_s == 51.0 + CLOCK_PATIENCE + 1
 
 
-def test_bodies_beyond_the_limit_are_left_out():
+def test_bodies_beyond_the_limit_are_dropped():
     assembler = FrameAssembler("osc:test")
     for n in range(MAX_BODIES + 5):
         assembler.add(split_packet(pose(n)), 0.0)
@@ -266,7 +266,7 @@ def test_unity_euler_angles_turn_about_z_then_x_then_y(angles):
     assert quat_to_matrix(np.array(unity_euler_to_quat(*angles))) == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_turn_in_unity_seen_with_the_eye():
+def test_a_rotation_in_unity_that_is_checked_by_eye():
     # Unity: +90 degrees about y turns forward (+z) to the right (+x). Right is -x in our frame.
     turn = quat_to_matrix(np.array(unity_euler_to_quat(0.0, 90.0, 0.0)))
     assert turn @ [0, 0, 1] == pytest.approx([-1, 0, 0], abs=1e-12)

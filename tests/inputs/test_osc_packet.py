@@ -76,7 +76,7 @@ def nested(depth):
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "expected"),
     [
         (b"", "0 bytes"),
         (b"/a\0", "3 bytes"),
@@ -96,36 +96,36 @@ def nested(depth):
         (bytes(MAX_DATAGRAM_BYTES + 4), "are allowed"),
     ],
 )
-def test_wrong_packets_are_named(data, says):
-    with pytest.raises(MessageError, match=says):
+def test_wrong_packets_are_named(data, expected):
+    with pytest.raises(MessageError, match=expected):
         split_packet(data)
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "expected"),
     [
-        (b"/abc", "not ended"),
-        (b"/ab\0,i\0x\0\0\0\7", "not ended"),
-        (b"/a\0x,i\0\0\0\0\0\7", "not ended"),
+        (b"/abc", "does not end"),
+        (b"/ab\0,i\0x\0\0\0\7", "does not end"),
+        (b"/a\0x,i\0\0\0\0\0\7", "does not end"),
         (b"/\xff\xfe\0,i\0\0\0\0\0\7", "not UTF-8"),
-        (b"/*\0\0,i\0\0\0\0\0\7", "no pattern"),
+        (b"/*\0\0,i\0\0\0\0\0\7", "without any of"),
         (b"/\n\0\0,i\0\0\0\0\0\7", "printable"),
         (b"/" + b"a" * 299 + bytes(4), "256"),
         (b"/a\0\0xi\0\0\0\0\0\7", "type tags"),
         (b"/a\0\0," + b"i" * 70 + b"\0" + bytes(280), "64"),
         (b"/a\0\0,i\0\0", "cut off"),
         (b"/a\0\0,d\0\0\0\0\0\0", "cut off"),
-        (b"/a\0\0,Q\0\0\0\0\0\7", "'Q' is not known"),
+        (b"/a\0\0,Q\0\0\0\0\0\7", "'Q' is unknown"),
         (b"/a\0\0,i\0\0\0\0\0\7\0\0\0\7", "4 bytes after"),
-        (b"/a\0\0,s\0\0abcd", "not ended"),
+        (b"/a\0\0,s\0\0abcd", "does not end"),
         (b"/a\0\0,s\0\0\xff\xfe\0\0", "not UTF-8"),
         (b"/a\0\0,b\0\0\xff\xff\xff\xff", "size -1"),
         (b"/a\0\0,b\0\0\0\0\0\x05abcd", "size 5"),
         (b"/a\0\0,b\0\0", "0 bytes are left"),
     ],
 )
-def test_wrong_messages_are_named(data, says):
-    with pytest.raises(MessageError, match=says):
+def test_wrong_messages_are_named(data, expected):
+    with pytest.raises(MessageError, match=expected):
         read(data)
 
 

@@ -58,7 +58,7 @@ def test_bundled_frames_arrive_in_order(receiver, heard, sockets):
     assert frames[0].source == f"osc:127.0.0.1:{udp.getsockname()[1]}"
 
 
-def test_loose_messages_without_marks_come_out_after_a_gap(receiver, heard, sockets):
+def test_unmarked_messages_become_a_frame_after_a_gap(receiver, heard, sockets):
     udp = sender(sockets, receiver)
     udp.send(osc("/rigidbody/1/position", *P))
     udp.send(osc("/rigidbody/1/quat", *Q))
@@ -119,7 +119,7 @@ def test_senders_that_come_and_go_do_not_pile_up(receiver, heard, sockets):
     assert len(receiver._assemblers) == MAX_SENDERS
 
 
-def test_only_listed_addresses_are_heard(heard, telemetry, sockets):
+def test_only_allowed_addresses_may_send(heard, telemetry, sockets):
     allow = [ipaddress.ip_network("127.0.0.2/32")]
     receiver = OscBodies(OSC.intake(heard, telemetry), port=0, allow=allow)
     receiver.start()

@@ -1,4 +1,4 @@
-"""A take played through real sockets: every frame arrives as it was, and every tick of it comes out of a server."""
+"""A take played through real sockets: every frame arrives unchanged, and a server makes hands of every tick."""
 
 import queue
 import threading
@@ -48,7 +48,7 @@ def frames(count: int, start_s: float = 100.0, bodies: int = 2) -> list[BodyFram
 
 
 class Receiving:
-    """A receiver of the server and what it heard."""
+    """A receiver of the server, and the frames it has received."""
 
     def __init__(self, kind: str) -> None:
         self.heard: queue.Queue[BodyFrame] = queue.Queue()
@@ -81,7 +81,7 @@ def test_every_frame_arrives_as_it_was_sent(receiving: Receiving) -> None:
         ]
 
 
-def test_frames_never_leave_before_their_time() -> None:
+def test_frames_are_never_sent_before_their_time() -> None:
     sent = frames(40)
 
     class Sender:
@@ -114,24 +114,24 @@ def test_a_large_frame_takes_several_bundles() -> None:
     receiving.receiver.stop()
 
 
-def test_names_that_no_address_can_carry() -> None:
+def test_names_that_fit_no_address() -> None:
     body = BodySample(None, "a/b", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True)
     with pytest.raises(MessageError, match="'a/b' cannot be sent over OSC"):
         osc_datagrams(BodyFrame(0.0, 0, (body,), 0.0, "test"))
 
 
-def test_nobody_listens(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_receives(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("manipnet.inputs.playback.CONNECT_S", 0.2)
     receiving = Receiving("tcp")
     receiving.receiver.stop()
-    with pytest.raises(PlayError, match="nobody listens for bodies at tcp://127"):
+    with pytest.raises(PlayError, match="nothing receives bodies at tcp://127"):
         replay.connect(receiving.url)
     with pytest.raises(PlayError, match="nowhere"):
         OscBodySender("nowhere.invalid", 39540)
 
 
 @pytest.mark.parametrize("url", ["127.0.0.1:5556", "udp://127.0.0.1:5556", "tcp://", "osc://host:99999"])
-def test_where_to_is_checked(url: str) -> None:
+def test_the_address_to_play_to_is_checked(url: str) -> None:
     with pytest.raises(ValueError, match=r"tcp://HOST:PORT or osc://HOST:PORT|HOST or HOST:PORT"):
         replay.connect(url)
 
@@ -145,7 +145,7 @@ def short_take(start_s: float, seconds: float = 1.5, rate_hz: float = 120.0) -> 
 
 
 @pytest.mark.parametrize("kind", ["tcp", "osc"])
-def test_all_ticks_of_a_take_come_out(
+def test_a_server_makes_hands_of_every_tick_of_a_take(
     stage: Stage, kind: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     stage.start_s += 1000.0

@@ -1,4 +1,4 @@
-"""Who sends, how often, and how far its clock is: by frames whose way is made up."""
+"""Statistics of senders, from frames with simulated transit times."""
 
 import random
 
@@ -25,7 +25,7 @@ def senders(passed):
     return SenderStats(passed.append)
 
 
-def test_every_frame_is_handed_on_and_counted(senders, passed):
+def test_every_frame_is_passed_on_and_counted(senders, passed):
     given = list(frames(120, 3.0))
     for frame in given:
         senders(frame)
@@ -37,7 +37,7 @@ def test_every_frame_is_handed_on_and_counted(senders, passed):
     assert senders.report(3.0 + 3 * RATE_S)["osc:a"]["rate_hz"] == 0.0
 
 
-def test_the_fastest_frame_tells_the_clock(senders):
+def test_the_fastest_frame_gives_the_clock_offset(senders):
     for frame in frames(120, 5.0, way_s=0.05):
         senders(frame)
     offset_s = senders.report(5.0)["osc:a"]["clock_offset_s"]
@@ -53,7 +53,7 @@ def test_a_clock_that_drifts_is_followed(senders):
     assert abs(offset_s - (100.0 - 1e-4 * 99)) < 2.1 * CLOCK_S * 1e-4
 
 
-def test_a_sender_that_starts_anew_has_another_clock(senders):
+def test_a_sender_that_restarts_has_another_clock(senders):
     for frame in [*frames(60, 5.0), *frames(60, 1.0, offset_s=-5.0, start_s=5.0)]:
         senders(frame)
     assert senders.report(6.0)["osc:a"]["clock_offset_s"] == pytest.approx(-5.0)

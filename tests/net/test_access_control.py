@@ -1,4 +1,4 @@
-"""The door of a socket: a crowd, and messages without end, cost those who are in nothing."""
+"""Access control of a socket: too many connections, and messages without end, do not affect the other clients."""
 
 import select
 import socket
@@ -22,7 +22,7 @@ MESSAGE = msgpack.packb({"t": 1.0, "bodies": [{"id": 1, "p": [0, 0, 0], "q": [0,
 
 
 class Door:
-    """A publisher that lets `MOST` in."""
+    """A publisher that allows `MOST` connections."""
 
     def __init__(self) -> None:
         self.telemetry, self.context = Telemetry(), zmq.Context()
@@ -50,7 +50,7 @@ def door():
 
 
 def subscribe(context, door):
-    """A subscriber that is in."""
+    """A subscriber that is connected."""
     sub = context.socket(zmq.SUB)
     sub.setsockopt(zmq.LINGER, 0)
     sub.subscribe(b"")
@@ -69,7 +69,7 @@ def knock(address: str) -> socket.socket:
 
 
 def speak_zmtp(address: str, kind: bytes) -> socket.socket:
-    """A connection that has made the handshake of ZMTP 3.1 as a socket of `kind`."""
+    """A connection that has completed the handshake of ZMTP 3.1 as a socket of `kind`."""
     tcp = knock(address)
     tcp.sendall(b"\xff" + bytes(8) + b"\x7f\x03\x01NULL" + bytes(16) + bytes(32))
     ready = b"\x05READY\x0bSocket-Type" + struct.pack(">I", len(kind)) + kind
@@ -86,7 +86,7 @@ def is_turned_away(address: str) -> bool:
 
 
 def is_cut_off(tcp: socket.socket, while_sending: bytes = b"") -> bool:
-    """Whether the other side ends the connection, while we keep sending the same."""
+    """Whether the other side ends the connection while we keep sending the same bytes."""
     tcp.setblocking(False)
     rest = memoryview(while_sending)
     try:
@@ -102,7 +102,7 @@ def is_cut_off(tcp: socket.socket, while_sending: bytes = b"") -> bool:
         return True
 
 
-def test_one_too_many_is_turned_away_counted_and_let_in_when_there_is_room(door):
+def test_one_connection_too_many_is_refused_and_counted_and_accepted_when_there_is_room(door):
     with zmq.Context() as context, ExitStack() as crowd:
         subs = [crowd.enter_context(subscribe(context, door)) for _ in range(MOST)]
         assert is_turned_away(door.address)
@@ -114,7 +114,7 @@ def test_one_too_many_is_turned_away_counted_and_let_in_when_there_is_room(door)
         crowd.enter_context(subscribe(context, door))
 
 
-def test_who_does_not_speak_zeromq_is_counted_and_who_does_is_not(monkeypatch):
+def test_a_client_that_does_not_speak_zeromq_is_counted(monkeypatch):
     monkeypatch.setattr(access, "HANDSHAKE_MS", 200)
     door = Door()
     with zmq.Context() as context, subscribe(context, door), knock(door.address) as browser:
@@ -137,7 +137,7 @@ def test_frames_without_end_cost_a_subscriber_its_connection(door):
 
 
 @pytest.mark.skipif(not hasattr(socket, "TCP_INFO"), reason="only Linux tells how much came over a connection")
-def test_frames_without_end_cost_a_sender_its_connection_and_others_nothing(heard, telemetry):
+def test_frames_without_end_cost_only_their_sender_the_connection(heard, telemetry):
     receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0)
     receiver.start()
     frame = b"\x03" + struct.pack(">Q", MAX_WIRE_BYTES) + bytes(MAX_WIRE_BYTES)
@@ -161,7 +161,7 @@ def pair():
             yield client, accepted, server.getsockname()[1]
 
 
-def test_messages_that_are_read_may_come_for_ever(pair):
+def test_messages_that_are_read_may_go_on_without_end(pair):
     client, accepted, port = pair
     refused: list[str] = []
     connections = Connections(MOST, refused.append)
@@ -178,7 +178,7 @@ def test_messages_that_are_read_may_come_for_ever(pair):
     assert refused == []
 
 
-def test_a_descriptor_that_is_no_longer_the_connections_is_left_alone(pair):
+def test_a_descriptor_that_was_reused_is_not_touched(pair):
     client, _, port = pair
     refused: list[str] = []
     connections = Connections(0, refused.append)

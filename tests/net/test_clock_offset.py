@@ -37,7 +37,7 @@ def test_the_smallest_round_trip_counts():
     assert probes.best(0.1).uncertainty_s == pytest.approx(0.0005, abs=1.1e-5)
 
 
-def test_an_old_probe_gives_way_to_a_newer_one():
+def test_a_newer_probe_replaces_an_old_one():
     probes = ClockProbes()
     probes.add(0.0, 10.0, 0.001)
     probes.add(100.0, 111.0, 100.004)

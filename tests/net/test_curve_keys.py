@@ -43,7 +43,7 @@ def receiver(folder, heard, telemetry):
 
 @pytest.fixture
 def connect(receiver):
-    """A publisher with the given keys, connected; it keeps sending only once it is subscribed to."""
+    """A connected publisher with the given keys. It sends only once the receiver has subscribed."""
     context = zmq.Context()
     made = []
 
@@ -69,7 +69,7 @@ def send(publisher):
 
 
 def wait_for_refusal(telemetry, reason):
-    """The refused client tries again and again; each try is counted. Waits on its own, bounded, without a clock."""
+    """Wait, for a limited time, until the attempts of a client that is refused have been counted."""
     with zmq.Context() as context, context.socket(zmq.PAIR) as nothing:
         for _ in range(2_000):
             if telemetry.counts().get("connections_refused", {}).get(reason):
@@ -83,7 +83,7 @@ def pair():
     return KeyPair(public.decode(), secret.decode())
 
 
-def test_a_listed_client_is_heard(folder, connect, heard):
+def test_a_listed_client_may_send(folder, connect, heard):
     send(connect(read_client_keys(make_client_keys(folder, "stage-pc"))))
     assert heard.next().t_s == 1.0
 
@@ -97,7 +97,7 @@ def test_a_listed_client_is_heard(folder, connect, heard):
     ],
     ids=["plain", "wrong server key", "not listed"],
 )
-def test_others_are_kept_out_counted_and_harmless(folder, connect, heard, telemetry, keys, reason):
+def test_other_clients_are_refused_and_counted(folder, connect, heard, telemetry, keys, reason):
     stranger = connect(keys(folder))
     wait_for_refusal(telemetry, reason)
     assert not stranger.poll(0)
@@ -107,7 +107,7 @@ def test_others_are_kept_out_counted_and_harmless(folder, connect, heard, teleme
     assert telemetry.counts()["frames_in"] == {"zmq": 1}
 
 
-def test_a_client_taken_off_the_list_is_kept_out_from_its_next_connection_on(folder, connect, heard, telemetry):
+def test_a_client_that_was_removed_from_the_list_cannot_connect_again(folder, connect, heard, telemetry):
     keys = read_client_keys(make_client_keys(folder, "stage-pc"))
     send(connect(keys))
     heard.next()
@@ -121,7 +121,7 @@ def test_a_list_that_cannot_be_read_lets_nobody_in(folder, connect, heard, telem
     (folder / ALLOW_FILE).write_text("nonsense\n")
     connect(keys)
     wait_for_refusal(telemetry, "not_listed")
-    assert "line 1: no public key" in caplog.text
+    assert "clients.allow:1: the line must be `public-key name`" in caplog.text
 
 
 def test_port_in_use_is_named_and_everything_is_closed(folder, receiver, heard, telemetry):
@@ -150,20 +150,20 @@ def test_secrets_can_be_read_by_their_owner_only(folder):
 
 
 def test_keys_are_never_replaced(folder):
-    with pytest.raises(KeyFileError, match="exists already"):
+    with pytest.raises(KeyFileError, match="already exists"):
         make_server_keys(folder)
     make_client_keys(folder, "a")
-    with pytest.raises(KeyFileError, match="exists already"):
+    with pytest.raises(KeyFileError, match="already exists"):
         make_client_keys(folder, "a")
 
 
 @pytest.mark.parametrize("name", ["", "server", "../up", "a b", "x" * 65, ".hidden", "a\n"])
 def test_wrong_client_names_are_refused(folder, name):
-    with pytest.raises(KeyFileError, match="is no client name"):
+    with pytest.raises(KeyFileError, match="cannot be the name of a client"):
         make_client_keys(folder, name)
 
 
-def test_missing_files_say_how_to_make_them(tmp_path):
+def test_the_error_of_a_missing_file_says_how_to_make_it(tmp_path):
     with pytest.raises(KeyFileError, match="manipnet keys make server"):
         read_server_keys(tmp_path)
     with pytest.raises(KeyFileError, match="manipnet keys make NAME"):
@@ -173,23 +173,23 @@ def test_missing_files_say_how_to_make_them(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "expected"),
     [
-        (b"", "no 'public'"),
+        (b"", "no key 'public'"),
         (b"\xff\xfe", "cannot read"),
-        (b"public = 3", "no 'public'"),
+        (b"public = 3", "no key 'public'"),
         (b"public = [", "cannot read"),
         (b'public = "short"', "40 Z85"),
     ],
 )
-def test_wrong_key_files_are_named(folder, text, says):
+def test_wrong_key_files_are_named(folder, text, expected):
     (folder / SERVER_FILE).write_bytes(text)
-    with pytest.raises(KeyFileError, match=says):
+    with pytest.raises(KeyFileError, match=expected):
         read_server_keys(folder)
 
 
 @pytest.mark.parametrize("line", ["short name", "é" * 40, "'" * 40 + " name"])
 def test_wrong_lines_of_the_list_are_named(folder, line):
     (folder / ALLOW_FILE).write_text("# comment\n\n" + line + "\n", encoding="utf-8")
-    with pytest.raises(KeyFileError, match=r"line 3|cannot read"):
+    with pytest.raises(KeyFileError, match=r"allow:3: the line must be|cannot read"):
         read_allow_list(folder / ALLOW_FILE)

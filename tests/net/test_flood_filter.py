@@ -25,7 +25,7 @@ def sockets():
 
 
 def passed(receiver, *senders):
-    """How many of 100 datagrams of each sender arrive."""
+    """How many of the 100 datagrams of each sender arrive."""
     for _ in range(100):
         for n, sender in enumerate(senders):
             sender.send(bytes([n]))
@@ -38,7 +38,7 @@ def passed(receiver, *senders):
 
 
 @linux
-def test_known_senders_pass_and_strangers_do_not(sockets):
+def test_known_senders_pass_and_unknown_ones_do_not(sockets):
     receiver, known, stranger = sockets
     kernel = FloodFilter(receiver)
     assert kernel.engage([("10.0.0.1", 5), known.getsockname()], 0.0)
@@ -48,7 +48,7 @@ def test_known_senders_pass_and_strangers_do_not(sockets):
 
 
 @linux
-def test_a_share_of_the_strangers_passes(sockets):
+def test_a_share_of_the_unknown_senders_passes(sockets):
     receiver, _, stranger = sockets
     kernel = FloodFilter(receiver)
     kernel.engage([], 0.5)
@@ -64,7 +64,7 @@ def test_the_program_is_bounded():
 
 
 class Recorder:
-    """Stands for the kernel: what it was told."""
+    """Stands in for the kernel and notes the calls."""
 
     def __init__(self):
         self.engaged, self.shares = False, []

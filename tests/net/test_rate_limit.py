@@ -1,6 +1,6 @@
-"""The guard against floods, with a clock that is stepped by hand."""
+"""Rate limits, with a clock that the test advances."""
 
-from manipnet.net.rate_limit import FAULTS_PER_S, MAX_SOURCES, STRANGERS_PER_S, SourceRateLimiter, Throttle
+from manipnet.net.rate_limit import FAULTS_PER_S, MAX_SOURCES, UNKNOWN_PER_S, SourceRateLimiter, Throttle
 
 
 def test_a_known_source_passes_through_any_flood():
@@ -8,11 +8,11 @@ def test_a_known_source_passes_through_any_flood():
     assert guard.admits("good", 0.0)
     guard.good("good")
     admitted = sum(guard.admits(f"stranger {n}", 0.5) for n in range(50_000))
-    assert admitted == STRANGERS_PER_S - 1
+    assert admitted == UNKNOWN_PER_S - 1
     assert guard.admits("good", 0.5)
 
 
-def test_one_loud_stranger_leaves_room_for_another():
+def test_one_loud_unknown_source_leaves_room_for_another():
     guard = SourceRateLimiter()
     for _ in range(50_000):
         if guard.admits("loud", 0.1):
@@ -29,7 +29,7 @@ def test_the_budget_is_new_each_second():
     assert guard.admits("loud", 1.0)
 
 
-def test_a_known_source_that_turns_bad_is_a_stranger_again():
+def test_a_known_source_that_turns_bad_is_unknown_again():
     guard = SourceRateLimiter()
     guard.good("relay")
     for _ in range(FAULTS_PER_S):
@@ -38,7 +38,7 @@ def test_a_known_source_that_turns_bad_is_a_stranger_again():
     assert not guard.admits("relay", 0.0)
     assert guard.admits("relay", 1.5)
     guard.good("relay")
-    assert all(guard.admits("relay", 1.6) for _ in range(2 * STRANGERS_PER_S))
+    assert all(guard.admits("relay", 1.6) for _ in range(2 * UNKNOWN_PER_S))
 
 
 def test_an_occasional_fault_is_forgiven():
@@ -58,7 +58,7 @@ def test_memory_is_bounded():
     assert len(guard._faults) <= MAX_SOURCES
 
 
-def test_a_known_source_may_be_read_so_often_a_second_and_takes_nothing_from_others():
+def test_the_limit_of_a_known_source_does_not_affect_others():
     guard = SourceRateLimiter(known_per_s=1_000)
     for source in ("mad", "sane"):
         guard.admits(source, 0.0)
@@ -68,7 +68,7 @@ def test_a_known_source_may_be_read_so_often_a_second_and_takes_nothing_from_oth
         assert all(guard.admits("sane", second + 0.9) for _ in range(360))
 
 
-def test_a_pace_lets_a_burst_through_and_then_so_many_a_second():
+def test_a_throttle_lets_a_burst_pass_and_then_a_steady_rate():
     pace, now = Throttle(per_s=100, burst=10), 5.0
     assert [pace.delay_s(now) for _ in range(10)] == [0.0] * 10
     for _ in range(200):

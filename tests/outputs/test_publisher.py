@@ -1,4 +1,4 @@
-"""Hands out, to a crowd: who does not read, and who may not, costs the others nothing."""
+"""Many clients of the hands: those that do not read, or may not connect, do not affect the others."""
 
 import itertools
 import threading
@@ -33,7 +33,7 @@ from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary
 
 CONFIG = ServerConfig((), protocols=(ZmqOutputOptions(port=0), WebSocketOptions(web_port=0)))
 MOST_KEPT_BYTES = 6 << 20
-"""For a client that has stopped: `HIGH_WATER_MARK` messages, and what the kernel holds of a connection."""
+"""Kept for a client that does not read: `HIGH_WATER_MARK` messages, and the kernel's buffers of its connection."""
 
 
 def publisher_of(telemetry, keys=None):
@@ -71,7 +71,7 @@ def subscriber(context, address, topic, keys=None, **options):
 
 
 def publish_until_heard(publisher, subs):
-    """Subscriptions take their time: publish until everybody has one message; the next number."""
+    """Publish until every subscriber has received a message. Returns the next number."""
     waiting = list(subs)
     for seq in itertools.count():
         publisher.publish(message(seq, seq / 60, 0.1))
@@ -87,7 +87,7 @@ def seq_of(sub):
 
 
 @pytest.mark.slow
-def test_a_subscriber_that_does_not_read_costs_the_others_nothing_and_is_bounded(publisher, context):
+def test_a_subscriber_that_does_not_read_does_not_affect_the_others(publisher, context):
     with ExitStack() as opened:
         readers = [opened.enter_context(subscriber(context, publisher.addresses["hands"], TOPIC_BIN)) for _ in range(2)]
         stopped = opened.enter_context(subscriber(context, publisher.addresses["hands"], b"", RCVHWM=1, RCVBUF=65_536))
@@ -136,7 +136,7 @@ STRANGERS = {
 
 
 @pytest.mark.parametrize(("keys", "reason"), STRANGERS.values(), ids=STRANGERS)
-def test_strangers_get_no_frame_send_none_ask_nothing_and_are_counted(context, tmp_path, keys, reason):
+def test_clients_without_the_right_keys_can_do_nothing_and_are_counted(context, tmp_path, keys, reason):
     make_server_keys(tmp_path)
     server, friend = read_server_keys(tmp_path), read_keys(make_client_keys(tmp_path, "stage-pc"))
     frames, hands, bodies, control = [], Telemetry(), Telemetry(), Telemetry()

@@ -1,4 +1,4 @@
-"""VMC out: bytes against the OSC specification, poses against a T-pose thought through by hand, another reader."""
+"""VMC: bytes against the OSC specification, poses against a T-pose worked out by hand, and an independent reader."""
 
 import select
 import socket
@@ -47,7 +47,7 @@ def test_bytes_are_those_of_the_osc_specification():
     )
 
 
-def test_a_bundle_fits_a_packet_and_says_what_the_specification_asks():
+def test_a_bundle_fits_a_packet_and_has_what_the_specification_asks_for():
     bundle = vmc.hand_bundle("right", messages()["live"].hands["right"], 1.5, PLAIN)
     assert len(bundle) + 28 <= 1500
     assert bundle[:16] == b"#bundle\0" + bytes(7) + b"\x01"

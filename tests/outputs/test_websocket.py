@@ -1,4 +1,4 @@
-"""Hands over WebSocket: every payload, the newest for slow readers, no other site's pages."""
+"""Hands over WebSocket: every payload arrives, slow clients get the newest, pages of other sites are refused."""
 
 import socket
 from contextlib import ExitStack
@@ -24,7 +24,7 @@ def publisher(telemetry):
 
 
 def receive(publisher, connection, payload):
-    """Publish until the client, whose joining nobody announces, has it."""
+    """Publish a payload until the client, whose connection is not announced, has received it."""
     while True:
         publisher.publish(payload)
         try:
@@ -69,7 +69,7 @@ def test_other_pages_may_not(publisher, origin):
         connect(publisher.address, origin=origin)
 
 
-def test_a_crowd_is_bounded_and_counted(publisher, telemetry):
+def test_the_number_of_clients_is_limited_and_refusals_are_counted(publisher, telemetry):
     with ExitStack() as crowd:
         for _ in range(MAX_CLIENTS):
             receive(publisher, crowd.enter_context(connect(publisher.address, max_queue=None)), b"x")
@@ -79,7 +79,7 @@ def test_a_crowd_is_bounded_and_counted(publisher, telemetry):
     assert telemetry.counts() == {"connections_refused": {"too_many": 1}}
 
 
-def test_a_chatterbox_is_cut_off(publisher, telemetry):
+def test_a_client_that_keeps_sending_is_cut_off(publisher, telemetry):
     with connect(publisher.address) as connection:
         connection.send(b"x" * 2000)
         with pytest.raises(ConnectionClosed, match="1009"):

@@ -219,12 +219,12 @@ def test_doctor_and_rig_init_listen_to_it(
     with Flight(port):
         control = f"--control-port={free_port(socket.SOCK_STREAM)}"
         assert doctor.main([*ports, control, "--seconds=1"]) == 1
-        said = capsys.readouterr().out
+        output = capsys.readouterr().out
         names = ["--left-wrist=left_wrist", "--right-wrist=right_wrist"]
         assert tools_cli.main(["rig", "init", str(tmp_path / "rig.toml"), *ports, *names, "--seconds=0.3"]) == 0
-    assert f"listening for 1 s on pigeon://127.0.0.1:{port}" in said
-    assert "with the bodies 'left_wrist', 'right_wrist', 'Box'" in said
-    assert "messages were dropped as lost_feather: pigeon:" in said
+    assert f"listening for 1 s on pigeon://127.0.0.1:{port}" in output
+    assert "with the bodies 'left_wrist', 'right_wrist', 'Box'" in output
+    assert "messages were dropped as lost_feather: pigeon:" in output
     written = (tmp_path / "rig.toml").read_text()
     assert f"pigeon_port = {port}" in written
     assert 'body = "Box"' in written

@@ -123,4 +123,4 @@ def test_keys_that_are_not_there_are_named(
     tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["--model", str(tiny_bundle), "--keys", str(tmp_path)]) == 1
-    assert "server.toml does not exist; make it with `manipnet keys make server`" in capsys.readouterr().err
+    assert "server.toml does not exist; `manipnet keys make server` makes it" in capsys.readouterr().err

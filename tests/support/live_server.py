@@ -35,7 +35,7 @@ def free_ports() -> list[str]:
 
 
 class LiveServer:
-    """`manipnet-serve` on free ports: its addresses, its lines, its end."""
+    """`manipnet-serve` on free ports, in a process of its own."""
 
     def __init__(self, *options: str, program: Sequence[str] = ("-m", "manipnet.cli")) -> None:
         command = [sys.executable, *program, *free_ports(), *options]
@@ -58,11 +58,11 @@ class LiveServer:
         return self
 
     def line(self) -> str:
-        """The next line on standard output; empty when the server has ended."""
+        """The next line on standard output, or an empty text if the server has ended."""
         return self.lines.get(timeout=PATIENCE_S)
 
     def ask(self, request: Any, as_json: bool = False, keys: ClientKeys | None = None) -> dict[str, Any]:
-        """One control request and its answer."""
+        """Send one control request. Returns the answer."""
         with zmq.Context() as context, context.socket(zmq.REQ) as req:
             req.setsockopt(zmq.LINGER, 0)
             if keys is not None:
@@ -74,7 +74,7 @@ class LiveServer:
             return json.loads(req.recv()) if as_json else msgpack.unpackb(req.recv())
 
     def stop(self, how: int = signal.SIGTERM) -> int:
-        """End it; the exit status."""
+        """Stop the server. Returns its exit status."""
         if self.process.poll() is None:
             self.process.send_signal(how)
         status = self.process.wait(PATIENCE_S)
@@ -85,7 +85,7 @@ class LiveServer:
 
 @contextmanager
 def serving(*options: str, program: Sequence[str] = ("-m", "manipnet.cli")) -> Iterator[LiveServer]:
-    """A server that is ready; stopped at the end, whatever happened."""
+    """A server that is ready. It is stopped at the end of the block."""
     server = LiveServer(*options, program=program)
     try:
         yield server.wait_ready()
@@ -95,7 +95,7 @@ def serving(*options: str, program: Sequence[str] = ("-m", "manipnet.cli")) -> I
 
 
 class Sender:
-    """Sends body messages; usable once the server has subscribed, which the constructor waits for."""
+    """Sends body messages. The constructor waits until the server has subscribed."""
 
     def __init__(self, address: str) -> None:
         self._context = zmq.Context()
@@ -107,7 +107,7 @@ class Sender:
         self._socket.recv()
 
     def send(self, t_s: float, bodies: dict[str | int, Sequence[float] | None], **more: Any) -> None:
-        """One frame of poses `(7,)` by name or id; None is a body that is not tracked."""
+        """Send one frame of poses `(7,)` by name or id, with None for a body that is not tracked."""
         entries = []
         for key, pose in bodies.items():
             p, q = (list(pose[:3]), list(pose[3:])) if pose is not None else ([0.0] * 3, [0.0, 0.0, 0.0, 1.0])
@@ -145,7 +145,7 @@ class Subscriber:
         return self._messages.get(timeout=PATIENCE_S)
 
     def until(self, t_capture: float, actor: str | None = None) -> list[HandsMessage]:
-        """Messages up to the first whose instant is `t_capture` or later."""
+        """The messages up to the first whose instant is `t_capture` or later."""
         messages = [self.next()]
         while messages[-1].t_capture < t_capture - 1e-6 or actor not in (None, messages[-1].actor):
             messages.append(self.next())
@@ -166,7 +166,7 @@ class Subscriber:
 
 
 def own_address() -> str | None:
-    """An address of this machine that is not its loopback; None without one. Nothing is sent."""
+    """An address of this machine other than its loopback, or None if it has none. Nothing is sent."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect(("192.0.2.1", 9))
@@ -180,7 +180,7 @@ Poses = Callable[[float], dict[str | int, Sequence[float] | None]]
 
 
 class Stage:
-    """A server with a sender and a subscriber, on which several performances follow each other."""
+    """A server with a sender and a subscriber, for several performances one after another."""
 
     def __init__(self, server: LiveServer) -> None:
         self.server = server
@@ -189,7 +189,7 @@ class Stage:
         self.start_s = 0.0
 
     def perform(self, seconds: float, poses: Poses, rate_hz: float = 120.0) -> list[HandsMessage]:
-        """Send `poses(t)`, t from zero, in real time; the messages of exactly that time."""
+        """Send `poses(t)` in real time, with t from zero. Returns the hands messages of exactly that time."""
         self.start_s += 1000.0
         begin_s = time.monotonic()
         for i in range(round(seconds * rate_hz) + 1):

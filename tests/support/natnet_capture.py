@@ -1,4 +1,4 @@
-"""The real NatNet capture, read from where the user keeps it: its UDP packets, and the vendor client's output."""
+"""Reads a real NatNet capture: its UDP packets, and the output of the vendor's client."""
 
 import os
 import re
@@ -12,7 +12,7 @@ Datagram = namedtuple("Datagram", "time_s source port destination destination_po
 
 
 def folder() -> Path:
-    """The capture's folder: MANIPNET_NATNET, or beside the take data; skips the test without it."""
+    """The folder of the capture, MANIPNET_NATNET or beside the take data. Skips the test if there is none."""
     beside = Path(os.environ.get("MANIPNET_DATA", "")).parent / "natnet"
     path = Path(os.environ.get("MANIPNET_NATNET", beside))
     if not (path / "traffic.pcapng").is_file():

@@ -1,4 +1,4 @@
-"""NatNet packets for tests, written field by field from the protocol's description, independent of the reader."""
+"""Writes NatNet packets for tests, field by field from the description of the protocol, independently of the reader."""
 
 import struct
 from dataclasses import dataclass, field
@@ -18,7 +18,7 @@ class Body:
 
 @dataclass
 class Frame:
-    """A frame with something in every section, so that each has to be stepped over rightly."""
+    """A frame with something in every section, so that each section must be skipped correctly."""
 
     number: int = 7
     bodies: list = field(default_factory=lambda: [Body(1), Body(2, params=0)])
@@ -62,7 +62,7 @@ class Frame:
 
 
 def definitions(names, version):
-    """Model definitions that name bodies `{id: name}`, between definitions of every other kind."""
+    """Model definitions with the body names `{id: name}`, between definitions of every other kind."""
 
     def body(id, name):
         data = name.encode() + b"\0" + struct.pack("<ii3f", id, -1, 0, 0, 0)
@@ -91,7 +91,7 @@ def definitions(names, version):
 
 
 def server_info(version=(3, 0), clock_hz=1_000_000, data_port=1511, group="239.255.42.99", name=b"Motive"):
-    """`SERVER_INFO`'s payload; `group` None is a unicast server."""
+    """The payload of `SERVER_INFO`. Without a `group`, the server uses unicast."""
     return (
         name.ljust(256, b"\0")
         + bytes([2, 1, 0, 0, *version, 0, 0])

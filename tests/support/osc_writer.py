@@ -6,7 +6,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 
 def osc(address, *arguments) -> bytes:
-    """A message; `(type, value)` chooses a type, everything else has python-osc's own."""
+    """A message. An argument `(type, value)` has that type, any other one the type that python-osc chooses."""
     builder = OscMessageBuilder(address)
     for argument in arguments:
         builder.add_arg(*(argument[::-1] if isinstance(argument, tuple) else (argument,)))

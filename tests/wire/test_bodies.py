@@ -1,4 +1,4 @@
-"""Body messages: what is accepted, and the error that names what was wrong."""
+"""Body messages: what is accepted, and errors that name what is wrong."""
 
 import contextlib
 import json
@@ -51,21 +51,21 @@ def test_optional_parts_may_be_missing(encode, message):
 
 
 @pytest.mark.parametrize(
-    ("message", "says"),
+    ("message", "expected"),
     [
         ([], "message is list"),
         ({"bodies": []}, "has no t"),
         ({**MESSAGE, "t": "now"}, "t is 'now'"),
         ({**MESSAGE, "t": True}, "t is True"),
         ({**MESSAGE, "t": math.nan}, "t is nan"),
-        ({**MESSAGE, "t": 1.7e12}, "no milliseconds"),
+        ({**MESSAGE, "t": 1.7e12}, "not milliseconds"),
         ({**MESSAGE, "frame": 1.5}, "frame is 1.5"),
         ({**MESSAGE, "frame": True}, "frame is True"),
         ({"t": 1.0}, "bodies is missing"),
         ({**MESSAGE, "bodies": {}}, "bodies is dict"),
         ({**MESSAGE, "bodies": [BODY, 3]}, "bodies[1] is int"),
-        ({**MESSAGE, "bodies": [BODY, BODY]}, "the id 7 twice"),
-        ({**MESSAGE, "bodies": [BODY, {**BODY, "id": 8}]}, "the name 'Box' twice"),
+        ({**MESSAGE, "bodies": [BODY, BODY]}, "two bodies have the id 7"),
+        ({**MESSAGE, "bodies": [BODY, {**BODY, "id": 8}]}, "two bodies have the name 'Box'"),
         ({**MESSAGE, "bodies": [{**BODY, "id": i} for i in range(257)]}, "256"),
         (with_body(id=..., name=...), "neither id nor name"),
         (with_body(id="7"), "bodies[0].id is '7'"),
@@ -80,10 +80,10 @@ def test_optional_parts_may_be_missing(encode, message):
         (with_body(p={"x": 1}), "a dict of 1"),
     ],
 )
-def test_wrong_message_is_named(encode, message, says):
+def test_wrong_message_is_named(encode, message, expected):
     with pytest.raises(MessageError) as caught:
         parse_bodies(encode(message), 0.0, "zmq")
-    assert says in str(caught.value)
+    assert expected in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_wrong_message_is_named(encode, message, says):
         ({"q": [0, 0, 0, 0]}, "zero_quaternion"),
     ],
 )
-def test_one_bad_pose_spares_the_others(encode, changes, fault):
+def test_one_bad_pose_does_not_affect_the_others(encode, changes, fault):
     good = {**BODY, "id": 8, "name": "other", "tracked": True}
     message = {**MESSAGE, "bodies": [{**BODY, "tracked": True, **changes}, good]}
     bad, other = parse_bodies(encode(message), 0.0, "zmq").bodies
@@ -104,7 +104,7 @@ def test_one_bad_pose_spares_the_others(encode, changes, fault):
     assert other.fault is None
 
 
-def test_zeros_of_a_body_sent_as_lost_are_no_fault(encode):
+def test_zeros_of_a_body_that_is_sent_as_lost_are_not_a_fault(encode):
     (body,) = parse_bodies(encode(with_body(p=[0, 0, 0], q=[0, 0, 0, 0], tracked=False)), 0.0, "zmq").bodies
     assert not body.tracked
     assert body.fault is None
@@ -133,7 +133,7 @@ def test_zeros_of_a_body_sent_as_lost_are_no_fault(encode):
         b" " * (MAX_MESSAGE_BYTES + 1),
     ],
 )
-def test_no_payload_escapes(payload):
+def test_any_payload_is_read_or_refused(payload):
     with pytest.raises(MessageError):
         parse_bodies(payload, 0.0, "zmq")
 
@@ -158,7 +158,7 @@ fields = st.fixed_dictionaries({}, optional=dict.fromkeys(BODY, values))
 
 @settings(max_examples=300, deadline=None)
 @given(t=values, frame=values, bodies=st.lists(fields | values, max_size=4))
-def test_any_shape_gives_a_sound_frame_or_message_error(t, frame, bodies):
+def test_any_structure_gives_a_valid_frame_or_message_error(t, frame, bodies):
     message = msgpack.packb({"t": t, "frame": frame, "bodies": bodies})
     with contextlib.suppress(MessageError):
         parsed = parse_bodies(message, 0.0, "zmq")
@@ -172,7 +172,7 @@ def test_any_shape_gives_a_sound_frame_or_message_error(t, frame, bodies):
     p=st.lists(st.floats(-1000, 1000), min_size=3, max_size=3),
     q=st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(lambda q: math.hypot(*q) > 1e-3),
 )
-def test_pose_survives_the_way(p, q):
+def test_a_pose_survives_writing_and_reading(p, q):
     (body,) = parse_bodies(msgpack.packb(with_body(p=p, q=q)), 0.0, "zmq").bodies
     assert body.p == tuple(p)
     assert body.q == pytest.approx([component / math.hypot(*q) for component in q])

@@ -47,7 +47,7 @@ def test_broken_binary_is_refused(path):
         wire.decode_binary(path.read_bytes())
 
 
-def test_another_version_is_refused_with_both_named():
+def test_another_version_is_refused_and_both_are_named():
     with pytest.raises(MessageError, match=r"version 2.* version 1"):
         wire.decode_binary((VECTORS / "bad_version_2.bin").read_bytes())
     with pytest.raises(MessageError, match=r"version 9.* version 1"):
@@ -113,7 +113,7 @@ def test_garbage_raises_only_message_error(data):
 
 
 @given(st.integers(0, 2855), st.binary(min_size=1, max_size=8))
-def test_a_changed_byte_never_escapes_as_another_error(offset, data):
+def test_a_changed_byte_raises_no_other_error(offset, data):
     good = wire.encode_binary(LIVE)
     try:
         message = wire.decode_binary((good[:offset] + data + good[offset + len(data) :])[: len(good)])

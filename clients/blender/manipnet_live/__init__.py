@@ -1,4 +1,4 @@
-"""ManipNet Live for Blender: fingers on an armature or as empties, live and as keyframes."""
+"""ManipNet Live for Blender: hands on an armature or as empties, live and as keyframes."""
 
 import bpy
 
@@ -7,7 +7,7 @@ from .session import session
 
 
 def register() -> None:
-    """Called by Blender when the extension is enabled."""
+    """Register the extension; Blender calls this when the extension is enabled."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.manipnet = bpy.props.PointerProperty(type=Settings)
@@ -15,7 +15,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by Blender when the extension is disabled: no thread and no timer may outlive it."""
+    """Stop the session and unregister everything; Blender calls this when the extension is disabled."""
     _stop()
     bpy.app.handlers.load_pre.remove(_stop)
     del bpy.types.Scene.manipnet

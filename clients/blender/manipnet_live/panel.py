@@ -1,4 +1,4 @@
-"""The sidebar tab "ManipNet" of the 3D view."""
+"""The tab "ManipNet" in the sidebar of the 3D view."""
 
 import bpy
 
@@ -7,27 +7,34 @@ from .session import session
 
 
 class Settings(bpy.types.PropertyGroup):
-    """Kept in the scene."""
+    """The settings, which Blender saves in the scene."""
 
     address: bpy.props.StringProperty(
-        name="Server", default="tcp://127.0.0.1:5555", description="As the server's `ready` line tells it"
+        name="Server", default="tcp://127.0.0.1:5555", description="Address for hands in the server's line `ready`"
     )
-    actor: bpy.props.StringProperty(name="Actor", description="Whose hands; empty for the first seen")
+    actor: bpy.props.StringProperty(
+        name="Actor", description="Actor whose hands are shown; empty for the first one received"
+    )
     delay: bpy.props.FloatProperty(
-        name="Delay", default=0.1, min=0.0, max=0.5, unit="TIME_ABSOLUTE", description="Bridges jitter and losses"
+        name="Delay",
+        default=0.1,
+        min=0.0,
+        max=0.5,
+        unit="TIME_ABSOLUTE",
+        description="Time by which the hands are shown late, to bridge jitter and lost frames",
     )
     armature: bpy.props.PointerProperty(
         name="Armature",
         type=bpy.types.Object,
         poll=lambda _, found: found.type == "ARMATURE",
-        description="Whose fingers to drive; empty for empties at the joints",
+        description="Armature whose fingers follow; without one, empties show the joints",
     )
     follow_wrists: bpy.props.BoolProperty(
-        name="Follow wrists", description="Move the hand bones to the tracked wrists too"
+        name="Follow wrists", description="Also move the hand bones to the tracked wrists"
     )
 
 
-class MANIPNET_OT_connect(bpy.types.Operator):  # noqa: N801  (Blender asks for such names)
+class MANIPNET_OT_connect(bpy.types.Operator):  # noqa: N801  (Blender requires such names)
     """Receive hands and show them"""
 
     bl_idname = "manipnet.connect"
@@ -43,7 +50,7 @@ class MANIPNET_OT_connect(bpy.types.Operator):  # noqa: N801  (Blender asks for 
         return {"FINISHED"}
 
 
-class MANIPNET_OT_disconnect(bpy.types.Operator):  # noqa: N801  (Blender asks for such names)
+class MANIPNET_OT_disconnect(bpy.types.Operator):  # noqa: N801  (Blender requires such names)
     """Stop receiving"""
 
     bl_idname = "manipnet.disconnect"
@@ -54,8 +61,8 @@ class MANIPNET_OT_disconnect(bpy.types.Operator):  # noqa: N801  (Blender asks f
         return {"FINISHED"}
 
 
-class MANIPNET_OT_record(bpy.types.Operator):  # noqa: N801  (Blender asks for such names)
-    """Collect what is shown; press again to make keyframes of it, from the current frame on"""
+class MANIPNET_OT_record(bpy.types.Operator):  # noqa: N801  (Blender requires such names)
+    """Record the shown motion. Press again to make keyframes from it, starting at the current frame"""
 
     bl_idname = "manipnet.record"
     bl_label = "Record"
@@ -66,14 +73,14 @@ class MANIPNET_OT_record(bpy.types.Operator):  # noqa: N801  (Blender asks for s
 
     def execute(self, context):
         if session.is_recording:
-            self.report({"INFO"}, f"{session.stop_recording()} frames recorded")
+            self.report({"INFO"}, f"Made keyframes for {session.stop_recording()} frames")
         else:
             session.start_recording()
         return {"FINISHED"}
 
 
-class MANIPNET_PT_panel(bpy.types.Panel):  # noqa: N801  (Blender asks for such names)
-    """Connection, status, recording"""
+class MANIPNET_PT_panel(bpy.types.Panel):  # noqa: N801  (Blender requires such names)
+    """Connection, status and recording"""
 
     bl_idname = "MANIPNET_PT_panel"
     bl_label = "ManipNet Live"
@@ -93,14 +100,14 @@ class MANIPNET_PT_panel(bpy.types.Panel):  # noqa: N801  (Blender asks for such 
         layout.operator("manipnet.disconnect", icon="PAUSE")
         recording = session.is_recording
         layout.operator(
-            "manipnet.record", text="Stop and key" if recording else "Record", icon="REC", depress=recording
+            "manipnet.record", text="Stop and make keyframes" if recording else "Record", icon="REC", depress=recording
         )
         stats = session.stats()
         layout.label(text=stats.state)
         if stats.received:
             layout.label(text=f"{stats.rate_hz:.1f} Hz, age {1000 * stats.age_s:.0f} ms, {stats.lost} lost")
         else:
-            layout.label(text="Nothing has arrived: does the server run?", icon="INFO")
+            layout.label(text="Nothing has arrived. Is the server running?", icon="INFO")
 
 
 CLASSES = (Settings, MANIPNET_OT_connect, MANIPNET_OT_disconnect, MANIPNET_OT_record, MANIPNET_PT_panel)

@@ -1,13 +1,13 @@
-"""What was shown, as keyframes: collected while live, written in bulk at the end, one action per armature."""
+"""Recording of the shown motion, which is written as keyframes at the end: one action for the armature."""
 
 import bpy
 import numpy as np
 
 
 class Recording:
-    """Bones over time: rotations of all, locations of those `moved`.
+    """The rotations of all bones over time, and the locations of the bones `moved`.
 
-    `add` is cheap; `write` makes all keys at once, one per scene frame.
+    `add` is cheap; `write` makes all keyframes at once, one per scene frame.
     """
 
     def __init__(self, armature: bpy.types.Object, bone_names: list[str], moved: list[str]) -> None:
@@ -20,32 +20,32 @@ class Recording:
         return len(self._times)
 
     def add(self, time_s: float, rotations: np.ndarray, locations: np.ndarray) -> None:
-        """One instant: `rotations (bones, 4)` wxyz, `locations (moved, 3)`. Instants that do not rise are left out."""
+        """Add `rotations (bones, 4)` wxyz and `locations (moved, 3)` of an instant that is later than the last one."""
         if not self._times or time_s > self._times[-1]:
             self._times.append(time_s)
             self._rotations.append(rotations)
             self._locations.append(locations)
 
     def write(self, first_frame: int, fps: float) -> int:
-        """Make an action of it on the armature, from `first_frame` on; returns the number of frames."""
+        """Write the recording as an action of the armature from `first_frame` on; returns the number of frames."""
         if len(self._times) < 2:
             return 0
         times = np.array(self._times) - self._times[0]
         frames = np.arange(int(times[-1] * fps) + 1)
         curves = _new_curves(self._armature)
-        for names, what, values in (
-            (self._bone_names, "rotation_quaternion", self._turns(times, frames / fps)),
+        for names, channel_name, values in (
+            (self._bone_names, "rotation_quaternion", self._rotations_at(times, frames / fps)),
             (self._moved, "location", _resampled(np.array(self._locations), times, frames / fps)),
         ):
             for i, name in enumerate(names):
-                path = f'pose.bones["{bpy.utils.escape_identifier(name)}"].{what}'
+                path = f'pose.bones["{bpy.utils.escape_identifier(name)}"].{channel_name}'
                 for channel in range(values.shape[-1]):
                     _fill(curves.new(path, index=channel), first_frame + frames, values[:, i, channel])
                 self._armature.pose.bones[name].rotation_mode = "QUATERNION"
         return len(frames)
 
-    def _turns(self, times: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """The rotations at other times, `(T, bones, 4)`."""
+    def _rotations_at(self, times: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """The rotations `(T, bones, 4)`, interpolated at the times `at (T,)`."""
         rotations = np.array(self._rotations)
         dots = np.sum(rotations[1:] * rotations[:-1], axis=-1)
         signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)
@@ -55,15 +55,15 @@ class Recording:
 
 
 def _resampled(values: np.ndarray, times: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Values `(N, bones, channels)` at `times`, linearly at other times."""
+    """Values `(N, bones, channels)` at `times (N,)`, interpolated linearly at `at (T,)`."""
     out = np.empty((len(at), *values.shape[1:]))
-    for place in np.ndindex(values.shape[1:]):
-        out[(slice(None), *place)] = np.interp(at, times, values[(slice(None), *place)])
+    for index in np.ndindex(values.shape[1:]):
+        out[(slice(None), *index)] = np.interp(at, times, values[(slice(None), *index)])
     return out
 
 
 def _new_curves(armature: bpy.types.Object):
-    """The F-curves of a new action on the armature: in a slot where Blender has them (4.4 on)."""
+    """The F-curves of a new action of the armature, in a slot if Blender has slots (since 4.4)."""
     action = bpy.data.actions.new("ManipNet")
     data = armature.animation_data or armature.animation_data_create()
     data.action = action

@@ -1,4 +1,4 @@
-"""Hands on things in the scene: bones of an armature, or empties at the joints."""
+"""Shows hands in the scene, on the bones of an armature or as empties at the joints."""
 
 import bpy
 import mathutils
@@ -11,11 +11,11 @@ from .manipnet_client.retarget import FINGERS, PARTS, HandRig, conjugate, is_han
 
 
 class RigError(ValueError):
-    """An armature whose fingers cannot be found; the text names the missing bones."""
+    """An armature has no known fingers; the text names the missing bones."""
 
 
 class ArmatureHand:
-    """One hand of an armature. The rest pose may be any: bones are turned to point where the synthesised ones do."""
+    """One hand of an armature. With any rest pose, its bones point where the synthesised ones do."""
 
     def __init__(self, armature: bpy.types.Object, side: str, follow_wrist: bool) -> None:
         self._armature, self._side, self._follow_wrist = armature, side, follow_wrist
@@ -27,7 +27,7 @@ class ArmatureHand:
             for part in range(len(PARTS))
         ]
         wanted = ["Hand"] + [finger + part for finger in FINGERS for part in PARTS]
-        missing = [what for what, name in zip(wanted, [hand, *names], strict=True) if name is None]
+        missing = [part for part, name in zip(wanted, [hand, *names], strict=True) if name is None]
         if missing:
             raise RigError(f"{armature.name} has no bone for {', '.join(missing)} of the {side} hand")
         self.bone_names = [str(name) for name in names]
@@ -52,7 +52,7 @@ class ArmatureHand:
         self._parents = [self.bone_names.index(name) if name in self.bone_names else -1 for name in parents]
 
     def solve(self, hand: Hand) -> np.ndarray:
-        """Each bone's rotation from its rest pose, as Blender wants it, `(15, 4)` wxyz."""
+        """The rotation of each bone from its rest pose, `(15, 4)` wxyz as in Blender."""
         turned = self._rig.solve(hand)
         basis = np.empty((len(turned), 4))
         for i, parent in enumerate(self._parents):
@@ -63,14 +63,14 @@ class ArmatureHand:
         return basis[:, [3, 0, 1, 2]]
 
     def keys(self, hand: Hand) -> tuple[np.ndarray, np.ndarray]:
-        """What keyframes of the pose shown hold: rotations wxyz of `bone_names` and `moved`, locations of `moved`."""
+        """The values of keyframes: rotations wxyz of the bones `bone_names` and `moved`, and locations of `moved`."""
         moved = [self._armature.pose.bones[name] for name in self.moved]
         rotations = [np.array(bone.rotation_quaternion) for bone in moved]
         locations = [np.array(bone.location) for bone in moved]
         return np.vstack([self.solve(hand), *rotations]), np.array(locations).reshape(-1, 3)
 
     def show(self, hand: Hand, weight: float) -> None:
-        """Pose the bones; `weight` below one mixes in the pose they have."""
+        """Pose the bones; a `weight` below one blends with their present pose."""
         bones = self._armature.pose.bones
         if self._follow_wrist:
             place = mathutils.Vector(to_blender(hand.wrist)[:3])
@@ -87,16 +87,16 @@ class ArmatureHand:
 
 
 class JointEmpties:
-    """One hand as empties at its 26 OpenXR joints, +y to the finger tip; made when they are not there."""
+    """One hand as empties at its 26 OpenXR joints, +y towards the finger tip. Missing empties are created."""
 
     def __init__(self, side: str) -> None:
         self._objects = []
         for joint in JOINT_NAMES:
             name = f"manipnet_{side}_{joint}"
-            found = bpy.data.objects.get(name) or self._make(name)
+            found = bpy.data.objects.get(name) or self._create(name)
             self._objects.append(found)
 
-    def _make(self, name: str) -> bpy.types.Object:
+    def _create(self, name: str) -> bpy.types.Object:
         made = bpy.data.objects.new(name, None)
         made.empty_display_type = "ARROWS"
         made.empty_display_size = 0.01
@@ -105,7 +105,7 @@ class JointEmpties:
         return made
 
     def show(self, hand: Hand, weight: float) -> None:
-        """Move the empties; they stay where they are once the stream has faded."""
+        """Move the empties to the joints; after the stream has faded they stay in place."""
         if weight > 0.0:
             for found, joint in zip(self._objects, hand.joints, strict=True):
                 x, y, z, qx, qy, qz, qw = to_blender(joint)

@@ -1,4 +1,4 @@
-"""One connection and what it drives. The client reads on its own thread and never touches Blender; a timer shows."""
+"""A session: the client reads on its own thread and never uses Blender, and a timer shows the hands."""
 
 import time
 
@@ -16,7 +16,7 @@ SIDES = ("left", "right")
 
 
 class Session:
-    """At most one at a time. All methods belong to Blender's main thread."""
+    """The connection and the hands that it drives. Only Blender's main thread may call the methods."""
 
     def __init__(self) -> None:
         self._client: Client | None = None
@@ -27,25 +27,25 @@ class Session:
 
     @property
     def is_running(self) -> bool:
-        """Whether there is a connection, or the wish for one."""
+        """Whether the client is connected or tries to connect."""
         return self._client is not None
 
     @property
     def is_recording(self) -> bool:
-        """Whether instants are being collected."""
+        """Whether the shown motion is being recorded."""
         return self._recording is not None
 
     @property
     def can_record(self) -> bool:
-        """Whether there is an armature to make keyframes for."""
+        """Whether there is an armature that can have keyframes."""
         return self._armature is not None
 
     def stats(self) -> Stats:
-        """For the panel."""
+        """The statistics that the panel shows."""
         return self._client.stats() if self._client else Stats(state="off")
 
     def start(self, address: str, actor: str, delay_s: float, armature: bpy.types.Object | None, wrists: bool) -> None:
-        """Connect and begin to show; raises `ValueError` for a wrong address and `RigError` for an unknown rig."""
+        """Connect and show hands; raises `ValueError` for a wrong address and `RigError` for an unknown rig."""
         parse_address(address)
         self.stop()
         self._hands = {s: ArmatureHand(armature, s, wrists) if armature else JointEmpties(s) for s in SIDES}
@@ -54,7 +54,7 @@ class Session:
         bpy.app.timers.register(self._tick, first_interval=0.0)
 
     def stop(self) -> None:
-        """Disconnect; a recording that runs is written first."""
+        """Disconnect, after writing the keyframes of a running recording."""
         if self._client is None:
             return
         self.stop_recording()
@@ -66,14 +66,14 @@ class Session:
         self._armature = None
 
     def start_recording(self) -> None:
-        """Collect what is shown from now on."""
+        """Record the shown motion from now on."""
         if self._armature:
             names = [name for hand in self._hands.values() for name in (*hand.bone_names, *hand.moved)]
             moved = [name for hand in self._hands.values() for name in hand.moved]
             self._recording = Recording(self._armature, names, moved)
 
     def stop_recording(self) -> int:
-        """Write the keyframes, from the scene's current frame on; returns how many frames."""
+        """Write the keyframes from the scene's current frame on; returns the number of frames."""
         recording, self._recording = self._recording, None
         if recording is None:
             return 0
@@ -81,7 +81,7 @@ class Session:
         return recording.write(scene.frame_current, scene.render.fps / scene.render.fps_base)
 
     def _tick(self) -> float | None:
-        """Show the newest; nothing piles up, however slow Blender is. None ends the timer."""
+        """Show the hands of this moment, however slow Blender is; returns seconds until the next call, None to end."""
         if self._client is None:
             return None
         now_s = time.monotonic()

@@ -1,4 +1,7 @@
-"""One line a second about what arrives: `python print_hands.py [tcp://127.0.0.1:5555 [stage-pc.toml]]`."""
+"""Print a line a second about the hands that arrive.
+
+`python print_hands.py [tcp://127.0.0.1:5555 [stage-pc.toml]]`; the second argument names a file of keys.
+"""
 
 import sys
 import time

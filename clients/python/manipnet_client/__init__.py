@@ -1,4 +1,4 @@
-"""Receive the fingers of ManipNet Live: `for hands in subscribe("tcp://127.0.0.1:5555"): …`."""
+"""Receive hands from ManipNet Live: `for hands in subscribe("tcp://127.0.0.1:5555"): …`."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ __all__ = [
 def subscribe(
     address: str, actor: str | None = None, keys: str | PathLike[str] | None = None
 ) -> Generator[Hands, None, None]:
-    """The newest hands, again and again, for as long as you iterate. Slow consumers skip frames, never lag.
+    """Yield the newest hands of `actor` (the first seen, if None), each frame once, until the iteration is closed.
 
-    Waits while there is no server. `keys`: see `Client`. Raises `ValueError` for an address that is not
-    `tcp://host:port`.
+    A slow consumer skips frames and never lags. The iteration waits while there is no server. `keys` is explained at
+    `Client`. Raises `ValueError` for an address that is not `tcp://HOST:PORT`.
     """
     parse_address(address)
     return _iterate(address, actor, keys)
@@ -54,7 +54,7 @@ def _iterate(address: str, actor: str | None, keys: str | PathLike[str] | None) 
 async def subscribe_async(
     address: str, actor: str | None = None, keys: str | PathLike[str] | None = None
 ) -> AsyncGenerator[Hands, None]:
-    """As `subscribe`, for `async for`."""
+    """`subscribe` for `async for`."""
     client = Client(address, actor, keys=keys)
     hands = None
     try:

@@ -1,4 +1,4 @@
-"""The connection: a reader thread that keeps the newest frame, reconnects, and counts what it sees."""
+"""The client: a reader thread that keeps the newest frame, reconnects, and counts frames."""
 
 from __future__ import annotations
 
@@ -20,15 +20,17 @@ if TYPE_CHECKING:
     from .curve import SecureSubscription
 
 BACK_OFF_S, BACK_OFF_LIMIT_S = 0.1, 1.0
+"""The first pause before a new attempt to connect, which doubles up to the limit."""
 
 
 @dataclass(frozen=True)
 class Stats:
-    """What a status line shows.
+    """The state and the counters of a client.
 
-    `received` frames arrived; of these, `late` ones came too late to be shown, and `refused` ones could not be
-    read. `lost` frames never arrived. `seq`: the newest frame's number. `age_s`: time since it arrived. `transit_s`:
-    how long it was on its way, which means something only where server and client share a clock.
+    `received` counts readable frames, `late` those of them that came too late to be shown, `refused` frames that could
+    not be read, and `lost` frames that never arrived. `seq` is the number of the newest frame, and `age_s` the time
+    since it arrived. `transit_s` is the time from its publication to its arrival, which is meaningful only if server and
+    client share a clock.
     """
 
     state: str = "connecting"
@@ -44,11 +46,12 @@ class Stats:
 
 
 class Client:
-    """Receives the hands of one actor (the first seen, unless named) from `tcp://host:port`.
+    """Receives the hands of one actor (the first seen, if None) from `tcp://HOST:PORT`.
 
-    `keys` names the file of `manipnet keys make NAME`, for a server that asks for one; it needs pyzmq. Use as a context
-    manager, or call `close`. All methods may be called from any thread. Raises `ValueError` for an address or a file of
-    keys that is none.
+    `delay_s` is how far behind the newest frame `sample` shows the hands. `keys` names the file that
+    `manipnet keys make NAME` wrote, for a server that requires keys; it needs pyzmq. The client is a context manager;
+    otherwise call `close`. Any thread may call the methods. Raises `ValueError` for a wrong address or a wrong file of
+    keys.
     """
 
     def __init__(
@@ -56,7 +59,7 @@ class Client:
     ) -> None:
         self._open = _opener(address, keys)
         self._actor = actor
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._interpolator = Interpolator(delay_s)
         self._newest: Hands | None = None
         self._newest_at = 0.0
@@ -79,29 +82,29 @@ class Client:
         self._stopping.set()
         if subscription := self._subscription:
             subscription.interrupt()
-        with self._news:
-            self._news.notify_all()
+        with self._changed:
+            self._changed.notify_all()
         self._thread.join()
 
     @property
     def newest(self) -> Hands | None:
-        """The newest frame, or None before the first."""
+        """The newest frame, or None before the first one."""
         return self._newest
 
     def wait(self, after: Hands | None = None, timeout_s: float | None = None) -> Hands | None:
-        """The newest frame once it is another than `after`; None when time is up or the client is closed."""
-        with self._news:
-            self._news.wait_for(lambda: self._newest is not after or self._stopping.is_set(), timeout_s)
+        """Wait for a newer frame than `after` and return it; None after `timeout_s` or when the client is closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._newest is not after or self._stopping.is_set(), timeout_s)
             return None if self._newest is after or self._stopping.is_set() else self._newest
 
     def sample(self, now_s: float | None = None) -> Shown | None:
-        """What to show now (`time.monotonic()` unless told), interpolated; None before the first frame."""
-        with self._news:
+        """The interpolated hands to show at `now_s` (default: `time.monotonic()`), or None before the first frame."""
+        with self._changed:
             return self._interpolator.sample(time.monotonic() if now_s is None else now_s)
 
     def stats(self) -> Stats:
-        """Counters and rates as of now."""
-        with self._news:
+        """The present state, counters and rates."""
+        with self._changed:
             times, now = self._arrivals, time.monotonic()
             recent = [t for t in times if now - t < 1.0]
             rate = (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 1 else 0.0
@@ -140,12 +143,12 @@ class Client:
         except MessageError as error:
             self._set(state=f"message refused: {error}", refused=self._stats.refused + 1)
             return
-        with self._news:
+        with self._changed:
             if (self._actor or hands.actor) != hands.actor:
                 return
             self._actor = hands.actor
             self._accept(hands, arrival_s)
-            self._news.notify_all()
+            self._changed.notify_all()
 
     def _accept(self, hands: Hands, arrival_s: float) -> None:
         stats, (session, seq) = self._stats, self._last
@@ -158,15 +161,15 @@ class Client:
             self._newest, self._newest_at = hands, arrival_s
 
     def _set(self, **changes: object) -> None:
-        with self._news:
+        with self._changed:
             self._stats = replace(self._stats, **changes)  # type: ignore[arg-type]
 
 
 def _opener(address: str, keys: str | PathLike[str] | None) -> Callable[[], Subscription | SecureSubscription]:
-    """What makes a connection; raises `ValueError` where it never could."""
+    """A function that makes a connection; raises `ValueError` for a wrong address or a wrong file of keys."""
     where = (*parse_address(address), layout.TOPIC, layout.MAX_PAYLOAD_BYTES)
     if keys is None:
         return partial(Subscription, *where)
-    from .curve import SecureSubscription, read_keys  # only who has keys needs pyzmq
+    from .curve import SecureSubscription, read_keys  # pyzmq is needed only with keys
 
     return partial(SecureSubscription, *where, read_keys(keys))

@@ -1,4 +1,4 @@
-"""The sender's clock, seen from here: jitter removed, no step when the estimate improves."""
+"""An estimate of the sender's clock that removes jitter and makes no steps."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import math
 from collections import deque
 
 WINDOW = 64
-"""Arrivals, about one second, whose quickest one sets the target."""
+"""Number of arrivals, about one second, of which the quickest one sets the target."""
 
 STIFFNESS_HZ = 2.0
-"""How briskly the offset follows: a correction of 20 ms changes the display's speed by at most 1.5 %."""
+"""How quickly the offset follows the target: a correction of 20 ms changes the display's speed by at most 1.5 %."""
 
 SNAP_S = 0.25
-"""A larger error is a clock that jumped: follow it at once."""
+"""A larger error means that a clock has jumped; the offset follows it at once."""
 
 
 class SmoothClock:
-    """Offset of the local clock to the sender's: a critically damped spring to the least seen lately."""
+    """The offset between local and sender's clock: a critically damped spring towards the smallest recent offset."""
 
     def __init__(self) -> None:
         self._offsets: deque[float] = deque(maxlen=WINDOW)
@@ -24,18 +24,18 @@ class SmoothClock:
 
     @property
     def target_s(self) -> float:
-        """Least arrival minus capture time of the last `WINDOW` arrivals."""
+        """The smallest difference of arrival and capture time among the last `WINDOW` arrivals, seconds."""
         return min(self._offsets)
 
     def observe(self, arrival_s: float, capture_s: float) -> None:
-        """Take note of one arrival."""
+        """Record one arrival."""
         first = not self._offsets
         self._offsets.append(arrival_s - capture_s)
         if first:
             self._offset_s, self._speed, self._now_s = self.target_s, 0.0, arrival_s
 
     def capture_time(self, now_s: float) -> float:
-        """The sender's time at the local time `now_s`; call it with rising times."""
+        """The sender's time at the local time `now_s`, which must not decrease between calls."""
         step_s, self._now_s = max(now_s - self._now_s, 0.0), max(now_s, self._now_s)
         error = self._offset_s - self.target_s
         if abs(error) > SNAP_S:

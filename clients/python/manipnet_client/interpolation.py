@@ -1,4 +1,4 @@
-"""Show hands smoothly at any display rate: by capture time, a chosen delay behind, faded on loss."""
+"""Interpolates hands by capture time, a chosen delay behind, for any display rate, and fades them on loss."""
 
 from __future__ import annotations
 
@@ -12,20 +12,25 @@ from .message import Body, Hand, Hands
 from .spline import spline_weights
 
 RING = 32
+"""Number of frames that are kept."""
+
 HOLD_S, FADE_S, BLEND_S = 0.5, 0.5, 0.2
+"""On silence the pose is held and then faded; afterwards the display moves from the held pose to the stream."""
+
 STALE_S, STALE_LIMIT_S = 0.25, 0.5
+"""A frame that is later than the first is dropped, unless all frames are late for longer than the second."""
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What to draw now. `weight` falls from 1 to 0 when the stream is lost: mix your animation in by it."""
+    """The hands to draw. `weight` falls from 1 to 0 when the stream is lost; use it to blend to another animation."""
 
     hands: Hands
     weight: float
 
 
 class Interpolator:
-    """Frames of one actor on the 60 Hz grid of their capture times. Not thread-safe."""
+    """Interpolates the frames of one actor, which lie on the 60 Hz grid of their capture times. Not thread-safe."""
 
     def __init__(self, delay_s: float = 0.1) -> None:
         self.delay_s = delay_s
@@ -40,7 +45,7 @@ class Interpolator:
         self._starved = False
 
     def push(self, frame: Hands, arrival_s: float) -> bool:
-        """Take a frame that arrived at `arrival_s` of the local clock. False when it came too late."""
+        """Add a frame that arrived at `arrival_s` of the local clock; returns False if it came too late."""
         if self._newest and frame.session == self._newest.session and frame.seq <= self._newest.seq:
             self.late += 1
             return False
@@ -60,7 +65,7 @@ class Interpolator:
         return True
 
     def sample(self, now_s: float) -> Shown | None:
-        """What to show at the local time `now_s`, which must not fall; None before the first frame."""
+        """The hands to show at the local time `now_s`, which must not decrease; None before the first frame."""
         if self._newest is None:
             return None
         position = (self._clock.capture_time(now_s) - self.delay_s - self._t0) * RATE_HZ
@@ -72,7 +77,7 @@ class Interpolator:
         return self._shown
 
     def _is_other_stream(self, frame: Hands) -> bool:
-        """The first frame, a new session, or the sender's clock set back, as when a take loops."""
+        """Whether the frame is the first one, begins a new session, or has an earlier time, as when a take loops."""
         newest = self._newest
         if newest is None or frame.session != newest.session:
             return True
@@ -85,7 +90,7 @@ class Interpolator:
         self._starved = self._shown is not None
 
     def _is_stale(self, frame: Hands, arrival_s: float) -> bool:
-        """Backlog after a stall; but if everything is late for long, it is the clock that has changed."""
+        """Whether the frame is backlog after a stall; if frames stay late for long, the clock has changed instead."""
         if arrival_s - frame.t_capture - self._clock.target_s <= STALE_S:
             self._stale_since_s = None
             return False
@@ -100,7 +105,7 @@ class Interpolator:
         return round((frame.t_capture - self._t0) * RATE_HZ)
 
     def _eased(self, hands: Hands, starved_s: float, now_s: float) -> Hands:
-        """After a gap, glide from the pose that was held to the stream."""
+        """The hands, blended with the held pose for a short time after a gap."""
         if starved_s > 1.0 / RATE_HZ:
             self._starved = True
         elif self._starved:
@@ -125,7 +130,7 @@ def _smoothstep(x: float) -> float:
 
 
 def _mix(frames: dict[int, Hands], weights: dict[int, float], position: float) -> Hands:
-    """Weighted mean of frames; what cannot be mixed comes from the frame nearest to `position`."""
+    """The weighted mean of frames; values that cannot be averaged come from the frame nearest to `position`."""
     nearest = min(weights, key=lambda g: abs(g - position))
     reference = frames[nearest]
     parts = [(frames[g], w) for g, w in weights.items() if w != 0.0]
@@ -138,7 +143,7 @@ def _mix_hand(side: str, reference: Hand | None, parts: list[tuple[Hands, float]
     if reference is None:
         return None
     present = [(hand, w) for frame, w in parts if (hand := frame.hand(side)) is not None]
-    if len(present) < len(parts):  # a hand that comes or goes: no neighbours to mix with on one side
+    if len(present) < len(parts):  # the hand appears or disappears here, so it is not in all frames
         return reference
     return replace(
         reference,
@@ -165,7 +170,7 @@ def _mix_poses(reference: np.ndarray, parts: list[tuple[np.ndarray, float]]) -> 
 
 
 def _mix_quats(reference: np.ndarray, parts: list[tuple[np.ndarray, float]]) -> np.ndarray:
-    """Normalised weighted sum, each brought to the reference's half of the sphere first."""
+    """The normalised weighted sum of quaternions, each with the sign that is nearer to the reference."""
     total = np.zeros_like(reference)
     for quat, w in parts:
         dot = np.sum(quat * reference, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""One hands message, decoded from `pose/bin`. Right-handed, Y up, metres, radians, quaternions xyzw."""
+"""A hands message, decoded from `pose/bin`. Axes are right-handed with Y up; metres, radians, quaternions xyzw."""
 
 from __future__ import annotations
 
@@ -13,13 +13,16 @@ SIDES = ("left", "right")
 
 
 class MessageError(ValueError):
-    """A message that cannot be read; the text names what was wrong and what is allowed."""
+    """A message cannot be read; the text says what is wrong and what is allowed."""
 
 
 @dataclass(frozen=True)
 class Hand:
-    """One hand: `angles (20,)`, `rotations (17, 4)` local to the parent bone, `wrist (7,)` and the OpenXR
-    `joints (26, 7)` in the world. `object` is None when the fingers belong to none.
+    """One hand: `angles (20,)`, `rotations (17, 4)` relative to the parent bone, and `wrist (7,)` and OpenXR
+    `joints (26, 7)` in the world.
+
+    `state` is "live", "hold" or "rest". `object` is the object near the hand, or None. `scale` is the size of the hand
+    relative to the model's.
     """
 
     state: str
@@ -33,7 +36,7 @@ class Hand:
 
 @dataclass(frozen=True)
 class Body:
-    """A tracked body: `pose (7,)` in the world."""
+    """A tracked body with its `pose (7,)` in the world."""
 
     name: str
     tracked: bool
@@ -42,7 +45,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Hands:
-    """Both hands and the tracked bodies at one instant, `t_capture` on the sender's clock, seconds."""
+    """Both hands and the tracked bodies at one instant, which is `t_capture` in seconds of the sender's clock."""
 
     session: str
     actor: str
@@ -61,7 +64,7 @@ class Hands:
 
 
 def decode(payload: bytes) -> Hands:
-    """Read one `pose/bin` payload; raises `MessageError` and nothing else."""
+    """Decode one `pose/bin` payload; raises `MessageError` and no other error."""
     header, hands, bodies = _records(payload)
     numbers = [float(header[name]) for name in ("t_capture", "t_publish", "look_ahead")]
     latency = header["latency_ms"].astype(float)
@@ -70,7 +73,7 @@ def decode(payload: bytes) -> Hands:
     for record in hands:
         side = _word(SIDES, record["side"], "side")
         if side in by_side:
-            raise MessageError(f"the {side} hand occurs twice; once is allowed")
+            raise MessageError(f"the {side} hand occurs twice; it may occur once")
         by_side[side] = _hand(record)
     return Hands(
         _text(header["session"]),
@@ -88,23 +91,25 @@ def decode(payload: bytes) -> Hands:
 
 def _records(payload: bytes) -> tuple[Any, list[Any], list[Any]]:
     if len(payload) < layout.HEADER.itemsize or payload[:4] != layout.MAGIC.to_bytes(4, "little"):
-        raise MessageError("not a pose/bin message: it must start with MNPL and a whole header")
+        raise MessageError("the message is not pose/bin; it must begin with MNPL and a complete header")
     header = np.frombuffer(payload, layout.HEADER, 1)[0]
     if header["version"] != layout.VERSION:
         raise MessageError(
-            f"message is of version {header['version']}; this reader understands version {layout.VERSION}"
+            f"the message has version {header['version']}; this client understands version {layout.VERSION}"
         )
     sizes = [int(header[f"{name}_size"]) for name in ("header", "hand", "body")]
     least = [layout.HEADER.itemsize, layout.HAND.itemsize, layout.BODY.itemsize]
     hands, bodies = int(header["hand_count"]), int(header["body_count"])
     if any(size < low for size, low in zip(sizes, least, strict=True)):
-        raise MessageError(f"record sizes are {sizes}; at least {least} are needed")
+        raise MessageError(f"the record sizes are {sizes}; at least {least} are needed")
     if hands > len(SIDES) or bodies > layout.MAX_BODIES:
-        raise MessageError(f"{hands} hands and {bodies} bodies; 2 and {layout.MAX_BODIES} are allowed")
+        raise MessageError(
+            f"the message has {hands} hands and {bodies} bodies; at most 2 and {layout.MAX_BODIES} are allowed"
+        )
     first_body = sizes[0] + hands * sizes[1]
     total = first_body + bodies * sizes[2]
     if not len(payload) == total == int(header["total_size"]):
-        raise MessageError(f"message has {len(payload)} bytes; its header promises {total}")
+        raise MessageError(f"the message has {len(payload)} bytes, but its header says {total}")
 
     def read(dtype: np.dtype, start: int, stride: int, count: int) -> list[Any]:
         return [np.frombuffer(payload, dtype, 1, start + i * stride)[0] for i in range(count)]
@@ -131,12 +136,12 @@ def _body(record: Any) -> Body:
 
 def _require_finite(where: str, *arrays: Any) -> None:
     if not all(np.isfinite(array).all() for array in arrays):
-        raise MessageError(f"{where} holds a number that is not finite")
+        raise MessageError(f"the {where} has a number that is not finite")
 
 
 def _word(words: tuple[str, ...], index: int, what: str) -> str:
     if index >= len(words):
-        raise MessageError(f"{what} is {index}; allowed are 0 to {len(words) - 1} ({', '.join(words)})")
+        raise MessageError(f"the {what} is {index}; allowed are 0 to {len(words) - 1} ({', '.join(words)})")
     return words[index]
 
 

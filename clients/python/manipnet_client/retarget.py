@@ -1,6 +1,6 @@
-"""Fingers of any rig: turn its bones so that they point where ours do, whatever its axes, lengths and bind pose are.
+"""Retargeting to any rig: its finger bones point where the hand's do, whatever their axes, lengths and bind pose.
 
-Right-handed axes throughout, as in the messages and in Blender; quaternions xyzw.
+All axes are right-handed, as in the messages and in Blender; quaternions are xyzw.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from .message import Hand
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
 PARTS = ("Proximal", "Intermediate", "Distal")
 BONES = np.arange(2, 17)
-"""Our bone for each finger bone of a rig. The two carpal thumb angles multiply into what rigs call the first one."""
+"""The hand's bone for each finger bone of a rig. Rigs combine the two carpal angles of the thumb in its first bone."""
 
 _ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 _PARENTS = (-1, 0, 1, 2, 3, 0, 5, 6, 0, 8, 9, 0, 11, 12, 0, 14, 15)
@@ -21,9 +21,10 @@ _INDEX, _MIDDLE, _LITTLE = 3, 6, 12
 
 
 class HandRig:
-    """The bind pose of one hand of a rig, in the space of its hand bone.
+    """Poses the finger bones of one hand of a rig.
 
-    `positions (15, 3)` and `rotations (15, 4)`, thumb to little finger, proximal to distal, and `tips (5, 3)`.
+    The bind pose is given in the space of the rig's hand bone: `positions (15, 3)` and `rotations (15, 4)`, thumb to
+    little finger, proximal to distal, and `tips (5, 3)`.
     """
 
     def __init__(self, side: str, positions: np.ndarray, rotations: np.ndarray, tips: np.ndarray) -> None:
@@ -42,11 +43,11 @@ class HandRig:
             self._bind[i] = multiply(back, turned)
 
     def hand_rotation(self, hand: Hand) -> np.ndarray:
-        """The world rotation of the rig's hand bone that puts it where the tracked wrist is, `(4,)`."""
+        """The world rotation `(4,)` of the rig's hand bone that follows the tracked wrist."""
         return multiply(hand.wrist[3:], conjugate(self.wrist_to_hand))
 
     def solve(self, hand: Hand) -> np.ndarray:
-        """Rotations of the finger bones in the space of the rig's hand bone, `(15, 4)`."""
+        """The rotations `(15, 4)` of the finger bones in the space of the rig's hand bone."""
         world = np.empty((17, 4))
         world[0] = self.wrist_to_hand
         for bone in range(1, 17):
@@ -56,10 +57,10 @@ class HandRig:
 
 
 def matches(bone: str, side: str, finger: int, part: int) -> bool:
-    """Whether a rig's bone name means this finger bone.
+    """Whether the name `bone` of a rig means this bone of this finger, both counted from zero.
 
-    Understood: Unity and VMC (LeftIndexProximal), Mixamo (mixamorig:LeftHandIndex1), Unreal (index_01_l), Rigify
-    (f_index.01.L), VRoid (J_Bip_L_Index1).
+    It knows the names of Unity and VMC (LeftIndexProximal), Mixamo (mixamorig:LeftHandIndex1), Unreal (index_01_l),
+    Rigify (f_index.01.L) and VRoid (J_Bip_L_Index1).
     """
     name, letter, number = _plain(bone), side[0], part + 1
     if name == f"{side}{FINGERS[finger]}{PARTS[part]}".lower():
@@ -70,7 +71,7 @@ def matches(bone: str, side: str, finger: int, part: int) -> bool:
 
 
 def is_hand(bone: str, side: str) -> bool:
-    """Whether a rig's bone name means the hand itself."""
+    """Whether the name `bone` of a rig means the hand itself."""
     letter = side[0]
     return _plain(bone) in (f"{side}hand", f"hand{letter}", f"jbip{letter}hand", f"defhand{letter}")
 
@@ -80,7 +81,7 @@ def _plain(name: str) -> str:
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The rotation `b` followed by `a`, `(4,)` each."""
+    """The rotation `b` followed by `a`, each `(4,)`."""
     (ax, ay, az, aw), (bx, by, bz, bw) = a, b
     return np.array(
         [
@@ -98,22 +99,22 @@ def conjugate(q: np.ndarray) -> np.ndarray:
 
 
 def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """A vector turned by a unit quaternion."""
+    """A vector `(3,)`, rotated by a unit quaternion."""
     t = 2.0 * np.cross(q[:3], v)
     return v + q[3] * t + np.cross(q[:3], t)
 
 
 def from_to(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """The shortest turn that carries one direction into another."""
+    """The shortest rotation `(4,)` from one direction to another."""
     start, end = start / np.linalg.norm(start), end / np.linalg.norm(end)
     q = np.append(np.cross(start, end), 1.0 + start @ end)
-    if q[3] < 1e-6:  # opposite: half a turn about anything across
+    if q[3] < 1e-6:  # opposite directions: half a turn about any perpendicular axis
         q = np.append(np.cross(start, [1.0, 0.0, 0.0] if abs(start[0]) < 0.7 else [0.0, 1.0, 0.0]), 0.0)
     return q / np.linalg.norm(q)
 
 
 def _frame(along: np.ndarray, across: np.ndarray) -> np.ndarray:
-    """The orientation with x along the hand and y toward `across`."""
+    """The rotation `(4,)` of a frame with x along `along` and y towards `across`."""
     first = from_to(np.array([1.0, 0.0, 0.0]), along)
     unit = along / np.linalg.norm(along)
     _, y, z = rotate(conjugate(first), across - (across @ unit) * unit)

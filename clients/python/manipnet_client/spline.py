@@ -1,8 +1,8 @@
-"""Which frames to mix, and how much of each, to show an instant between them.
+"""The weights of frames that show an instant between them.
 
-A uniform cubic B-spline over the frames: its acceleration is the linear interpolation of the frames' own
-second differences, so at any display rate it never exceeds theirs. Lost frames are filled from two neighbours
-on each side.
+They are those of a uniform cubic B-spline over the frames. Its acceleration is the linear interpolation of the frames'
+second differences, so it never exceeds theirs at any display rate. A lost frame is replaced by the cubic through two
+neighbours on each side.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from collections.abc import Collection
 
 
 def spline_weights(position: float, present: Collection[int]) -> dict[int, float]:
-    """Weight of each frame of `present` (indices on a uniform grid, at least one) for the instant `position`.
+    """The weight of each frame for the instant `position`, by its index; the weights sum to one.
 
-    Positions before the first or after the last frame show that frame. The weights sum to one.
+    `present` holds the indices on a uniform grid of the frames that arrived, at least one. A position before the first
+    or after the last frame shows that frame.
     """
     first, last = min(present), max(present)
     if first == last:
@@ -35,7 +36,10 @@ def spline_weights(position: float, present: Collection[int]) -> dict[int, float
 
 
 def _control(index: int, first: int, last: int, present: Collection[int]) -> dict[int, float]:
-    """A grid point as a mix of frames: itself, filled if lost, continued straight beyond the ends."""
+    """The weights of frames that give the grid point `index`.
+
+    A lost frame is interpolated; beyond the ends the first or last two points are continued in a straight line.
+    """
     if index in present:
         return {index: 1.0}
     if index > last:
@@ -54,7 +58,7 @@ def _straight_on(end: int, inner: int, first: int, last: int, present: Collectio
 
 
 def _lagrange(index: int, nodes: list[int]) -> dict[int, float]:
-    """Weights of the polynomial through `nodes`, at `index`."""
+    """The weights with which the polynomial through `nodes` is evaluated at `index`."""
     weights = {}
     for node in nodes:
         weight = 1.0

@@ -1,4 +1,4 @@
-"""Rig files written: a whole configuration as one, and what was calibrated put into one that is there."""
+"""Writes rig files: a whole configuration, or the result of a calibration into an existing file."""
 
 import shutil
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ _METRE_DIGITS, _QUATERNION_DIGITS = 6, 8
 
 
 def rig_text(config: ServerConfig) -> str:
-    """A configuration as the text of a rig file, which read again gives the same one; paths become absolute."""
+    """A configuration as the text of a rig file, from which the same configuration is read. Paths become absolute."""
     document = tomlkit.document()
     if len(config.actors) == 1 and config.actors[0].name == "actor":
         for key, value in _actor(config.actors[0]).items():
@@ -45,10 +45,10 @@ def server_table(config: ServerConfig) -> dict[str, Any]:
 
 
 def store(path: Path, actor: ActorConfig, backup: bool = True) -> Path:
-    """Put where the actor's wrists and props sit, and the size of its hands, into a rig file; returns the `backup`'s
-    path. Whatever else is in the file stays as it is, comments too.
+    """Write the placement of the actor's wrists and props, and the size of its hands, into a rig file.
 
-    Raises `ConfigError`, and the file is as it was.
+    Everything else in the file stays as it is, comments too. Returns the path of the `backup`. Raises `ConfigError`,
+    and then the file has not changed.
     """
     path = path.resolve()
     try:
@@ -59,9 +59,9 @@ def store(path: Path, actor: ActorConfig, backup: bool = True) -> Path:
         return replace_file(path, after, backup)
     except (OSError, ValueError, TOMLKitError, KeyError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise ConfigError(
-            f"{path}: could not be changed ({reason}); put these lines in yourself:\n{_lines(actor)}"
-        ) from (None)
+        raise ConfigError(f"{path}: could not be changed ({reason}); add these lines yourself:\n{_lines(actor)}") from (
+            None
+        )
 
 
 def replace_file(path: Path, text: str, backup: bool = True) -> Path:
@@ -82,7 +82,7 @@ def _with_placements(text: str, actor: ActorConfig) -> str:
     if "actors" in document:
         table = next((entry for entry in document["actors"] if entry["name"] == actor.name), None)
         if table is None:
-            raise ConfigError(f"it has no actor {actor.name!r} any more")
+            raise ConfigError(f"it no longer has an actor {actor.name!r}")
     for wrist, body in actor.wrists.items():
         if body.offset is not None:
             _place(table["bodies"], wrist, body)
@@ -90,7 +90,7 @@ def _with_placements(text: str, actor: ActorConfig) -> str:
         if thing.body.offset is not None:
             entry = next((entry for entry in table["objects"] if _is(entry, thing)), None)
             if entry is None:
-                raise ConfigError(f"it has no object {thing.name!r} any more")
+                raise ConfigError(f"it no longer has an object {thing.name!r}")
             entry.update(_offset(thing.body.offset))
     if actor.hand_scale != table.get("hand_scale", 1.0):
         table["hand_scale"] = round(actor.hand_scale, 4)
@@ -109,13 +109,13 @@ def _is(entry: Mapping[str, Any], thing: ObjectConfig) -> bool:
 
 
 def _check(text: str, path: Path, actor: ActorConfig) -> None:
-    """Raise `ConfigError` unless the text says of the actor what it should."""
+    """Raise `ConfigError` unless the actor that is read from `text` has the right placements."""
     read = next(other for other in parse_rig(text, path.parent, str(path)).actors if other.name == actor.name)
     wanted = [*actor.wrists.values(), *(thing.body for thing in actor.objects)]
     found = [*read.wrists.values(), *(thing.body for thing in read.objects)]
     for a, b in zip(wanted, found, strict=True):
         if a.offset is not None and (b.offset is None or not np.allclose(a.offset, b.offset, atol=1e-4)):
-            raise ConfigError(f"the place of body {a.key!r} cannot be found in it")
+            raise ConfigError(f"the placement of body {a.key!r} cannot be found in it")
 
 
 def _actor(actor: ActorConfig) -> dict[str, Any]:
@@ -158,7 +158,7 @@ def _degrees(radians: float) -> float:
 
 
 def _lines(actor: ActorConfig) -> str:
-    """What belongs into a rig file for an actor's placements."""
+    """The lines of a rig file for an actor's placements."""
     bodies = {wrist: _body(body) for wrist, body in actor.wrists.items()}
     objects = [_object(thing) for thing in actor.objects if thing.body.offset is not None]
     table = {"hand_scale": round(actor.hand_scale, 4), "bodies": bodies} | ({"objects": objects} if objects else {})

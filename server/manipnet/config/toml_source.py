@@ -1,4 +1,4 @@
-"""The text of a rig file as a tree, what a command line sets on top of it, and where each key stands."""
+"""Parses a rig file to a tree of values, applies the settings of the command line, and finds the line of each key."""
 
 import json
 import re
@@ -9,14 +9,14 @@ from typing import Any
 from manipnet.common.options import ConfigError
 
 Place = tuple[str | int, ...]
-"""Keys from the top down; an entry of a list of tables by its index."""
+"""The path of a key from the top down, with an index for an entry of a list of tables."""
 
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]#]+?)\s*\]\]?\s*(#.*)?$")
 _ASSIGNMENT = re.compile(r"^\s*([A-Za-z0-9_.\"'-]+)\s*=")
 
 
 def read_tree(text: str, where: str, settings: Sequence[str] = ()) -> tuple[dict[str, Any], dict[Place, str]]:
-    """What a text says, `settings` `KEY=VALUE` on top, and how errors call the place of each key.
+    """The values of a TOML text, overridden by `settings` of the form `KEY=VALUE`, and how errors name each key.
 
     Raises `ConfigError`.
     """
@@ -33,7 +33,7 @@ def read_tree(text: str, where: str, settings: Sequence[str] = ()) -> tuple[dict
 
 
 def _parse_setting(setting: str) -> dict[str, Any]:
-    """`KEY=VALUE` as TOML; a value that is none is text, so names need no quotes."""
+    """Parse `KEY=VALUE` as TOML. A value that is not TOML is taken as text, so names need no quotes."""
     key, equals, value = setting.partition("=")
     for line in (setting, f"{key} = {json.dumps(value.strip())}") if equals else ():
         try:
@@ -50,7 +50,7 @@ def _merged(old: Any, new: Any) -> Any:
 
 
 def _paths(tree: Mapping[str, Any], at: Place = ()) -> list[Place]:
-    """Of every leaf."""
+    """The paths of all leaves."""
     return [
         path
         for key, value in tree.items()
@@ -59,7 +59,7 @@ def _paths(tree: Mapping[str, Any], at: Place = ()) -> list[Place]:
 
 
 def key_lines(text: str) -> dict[Place, int]:
-    """Line of each table and key of a TOML text, by path; list entries by index. Good enough for messages."""
+    """The line of each table and key of a TOML text, by path. It need not be exact for odd texts."""
     lines: dict[Place, int] = {}
     counts: dict[Place, int] = {}
     table: Place = ()
@@ -80,7 +80,7 @@ def _split(dotted: str) -> tuple[str, ...]:
 
 
 def _resolve(path: Place, counts: dict[Place, int]) -> Place:
-    """The path with the current index after every list of tables on the way, but for the last."""
+    """The path with the current index after each list of tables in it, except at its end."""
     resolved: Place = ()
     for i, key in enumerate(path):
         resolved = (*resolved, key)

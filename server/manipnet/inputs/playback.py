@@ -1,6 +1,6 @@
-"""Plays body frames through real sockets at their own time, as a tracker would send them.
+"""Plays body frames through real sockets in real time, as a tracker would send them.
 
-Deadlines are absolute, so lateness never adds up, and no frame leaves before the receiver listens.
+Deadlines are absolute, so delays do not add up, and no frame is sent before the receiver listens.
 """
 
 import ipaddress
@@ -19,15 +19,15 @@ from manipnet.inputs.osc.writer import osc_datagrams
 from manipnet.wire.bodies import BodyFrame, bodies_map
 
 CONNECT_S: Final = 10.0
-"""How long a receiver may take to answer, or to read on when it is behind."""
+"""How long to wait for a receiver to answer, or to read on when it has fallen behind."""
 
 
 class PlayError(OSError):
-    """Nobody to play to; the text names the address and what to do."""
+    """Nothing receives what is played. The text names the address and the remedy."""
 
 
 class BodySender(Protocol):
-    """Sends frames to one receiver."""
+    """Sends body frames to one receiver."""
 
     def send(self, frame: BodyFrame) -> None: ...
 
@@ -35,12 +35,15 @@ class BodySender(Protocol):
 
 
 class ZmqBodySender:
-    """A PUB socket that connects; the constructor waits until the receiver has subscribed."""
+    """Sends msgpack messages through a publishing socket that connects to the receiver."""
 
     def __init__(self, host: str, port: int, stopping: threading.Event | None = None) -> None:
-        """Raises `PlayError` when nobody subscribes within `CONNECT_S`, or once `stopping` is set."""
+        """Connect, and wait until the receiver has subscribed.
+
+        Raises `PlayError` if it has not within `CONNECT_S`, or when `stopping` is set.
+        """
         self._context = zmq.Context()
-        # XPUB is PUB that also hears of subscriptions: what is sent before the first one is lost.
+        # XPUB also receives the subscriptions. What is sent before the first one would be lost.
         self._socket = self._context.socket(zmq.XPUB)
         self._socket.setsockopt(zmq.LINGER, 1_000)
         self._socket.setsockopt(zmq.XPUB_NODROP, 1)
@@ -50,23 +53,25 @@ class ZmqBodySender:
         try:
             self._socket.connect(address)
             if not self._subscribed(stopping):
-                raise PlayError(f"nobody listens for bodies at {address}; is the server running, and its --input-port?")
+                raise PlayError(
+                    f"nothing receives bodies at {address}; is the server running, and is that its --input-port?"
+                )
         except zmq.ZMQError as error:
             self.close()
-            raise PlayError(f"{address} cannot be connected to: {zmq.strerror(error.errno or 0)}") from None
+            raise PlayError(f"cannot connect to {address}: {zmq.strerror(error.errno or 0)}") from None
         except BaseException:
             self.close()
             raise
 
     def send(self, frame: BodyFrame) -> None:
-        """One msgpack message; waits for a receiver that is behind. Raises `PlayError` when it stays so."""
+        """Send one message; wait if the receiver has fallen behind. Raises `PlayError` if it stays behind."""
         try:
             self._socket.send(msgpack.packb(bodies_map(frame)) or b"")
         except zmq.Again:
-            raise PlayError(f"the receiver has read nothing for {CONNECT_S:g} s") from None
+            raise PlayError(f"the receiver has not read anything for {CONNECT_S:g} s") from None
 
     def close(self) -> None:
-        """Send what is still waiting, for a second at most, and disconnect."""
+        """Send what still waits, for at most a second, and disconnect."""
         self._socket.close()
         self._context.term()
 
@@ -79,18 +84,18 @@ class ZmqBodySender:
 
 
 class OscBodySender:
-    """Sends each frame as one OSC bundle, or as several between start and end where one would be too large."""
+    """Sends each frame as one OSC bundle, or as several between start and end if one would be too large."""
 
     def __init__(self, host: str, port: int) -> None:
-        """Raises `PlayError` for a host without an address."""
+        """Raises `PlayError` if the host has no known address."""
         try:
             family, _, _, _, self._address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
         except OSError as error:
-            raise PlayError(f"{host!r} is no address or known name ({error.strerror or error})") from None
+            raise PlayError(f"{host!r} is not an address or a known name ({error.strerror or error})") from None
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
 
     def send(self, frame: BodyFrame) -> None:
-        """One frame; a receiver that is gone loses it, as UDP does. Raises `MessageError` for an impossible name."""
+        """Send one frame. It is lost if nothing receives it. Raises `MessageError` for a name that OSC cannot carry."""
         for datagram in osc_datagrams(frame):
             try:
                 self._socket.sendto(datagram, self._address)
@@ -104,7 +109,7 @@ class OscBodySender:
 
 @dataclass(frozen=True)
 class Played:
-    """What a performance came to: frames sent, how long it took, and the latest any frame was."""
+    """How playing went: the number of frames, the time it took, and the largest delay of a frame."""
 
     frames: int
     seconds: float
@@ -123,9 +128,9 @@ def play(
     stopping: threading.Event | None = None,
     sent: Callable[[Played], None] = lambda so_far: None,
 ) -> Played:
-    """Send every frame when its time `t_s` has come, `speed` times as fast; until the end or until `stopping`.
+    """Send each frame at its time `t_s`, played `speed` times as fast, until the last frame or until `stopping`.
 
-    `sent` hears how it stands after every frame.
+    `sent` is called after each frame.
     """
     stopping = stopping or threading.Event()
     begin_s, first_s = time.monotonic(), None
@@ -143,7 +148,7 @@ def play(
 
 
 def looped(frames: Sequence[BodyFrame]) -> Iterator[BodyFrame]:
-    """The frames over and over; time and frame numbers go on rising, one usual interval from end to start."""
+    """The frames, repeated without end. Times and frame numbers keep rising; the usual interval joins end and start."""
     if not frames:
         return
     intervals = sorted(b.t_s - a.t_s for a, b in pairwise(frames))

@@ -1,7 +1,7 @@
-"""Who sends bodies: how often, since when no more, and how far the clock behind the frames' times is from ours.
+"""Statistics of each sender of bodies: its rate, the age of its newest frame, and the offset of its clock.
 
-What comes in one direction only tells a clock's offset but for the way: the frame that was fastest counts. How fast it
-was nobody knows, so such an offset has no uncertainty; a ping exchange's has.
+One-way traffic gives the clock offset only up to the transit time, so the frame with the shortest transit counts. That
+transit time is unknown, so the offset has no uncertainty, unlike that of a ping exchange.
 """
 
 import threading
@@ -13,9 +13,9 @@ from manipnet.wire.bodies import BodyFrame
 MOST = 64
 RATE_S = 1.0
 CLOCK_S = 10.0
-"""The fastest frame of the last one to two of these counts: clocks drift."""
+"""The fastest frame of the last one to two of these periods counts, since clocks drift."""
 RESTART_S = 1.0
-"""No way varies by more than this: the sender's clock was set, or began anew."""
+"""Transit times vary by less than this. A larger change means that the sender's clock was set or restarted."""
 
 
 @dataclass(slots=True)
@@ -31,7 +31,7 @@ class _Sender:
 
 
 class SenderStats:
-    """Notes every frame on its way to `sink`. From any thread."""
+    """Notes every frame and passes it on to `sink`. From any thread."""
 
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
@@ -44,7 +44,7 @@ class SenderStats:
         self._sink(frame)
 
     def report(self, now_s: float) -> dict[str, dict[str, float | int | None]]:
-        """By source: frames so far, frames a second, age of the newest, offset of its clock from ours."""
+        """For each source: frames so far, frames per second, age of the newest frame, offset of its clock from ours."""
         with self._lock:
             return {
                 source: {
@@ -63,7 +63,7 @@ class SenderStats:
             frames = 0 if sender is None else sender.frames
             sender = _Sender(frames, now_s, now_s, 0, 0.0, now_s, offset_s, offset_s)
         if len(self._senders) >= MOST:
-            del self._senders[next(iter(self._senders))]  # the one not heard for longest
+            del self._senders[next(iter(self._senders))]  # the sender that has been silent for longest
         self._senders[frame.source] = sender
         sender.frames += 1
         sender.heard_s = now_s

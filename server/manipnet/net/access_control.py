@@ -1,4 +1,4 @@
-"""The door of a bound ZeroMQ socket: who may connect, how many at once, and what is done about the others."""
+"""Access control of a bound ZeroMQ socket: who may connect, how many at once, and what is logged about the others."""
 
 import logging
 import threading
@@ -15,14 +15,14 @@ from manipnet.telemetry import LogThrottle, Telemetry
 
 MOST_CONNECTIONS: Final = 64
 HANDSHAKE_MS: Final = 5_000
-"""A connection that says nothing is closed after this."""
+"""A connection that has not completed its handshake is closed after this time."""
 LOOK_MS: Final = 200
 _LOG_PERIOD_S: Final = 5.0
 _REFUSED: Final = {
-    "handshake": "a client without the right keys, or not of ZeroMQ",
-    "not_listed": "a client whose key is on no list",
-    "too_many": f"a client: {MOST_CONNECTIONS} are connected already",
-    "endless": "a client that sends frames without end and no message",
+    "handshake": "a client that has the wrong keys, or that does not speak ZeroMQ",
+    "not_listed": "a client whose key is not in clients.allow",
+    "too_many": f"a client, since {MOST_CONNECTIONS} are connected already",
+    "endless": "a client that sends frames without end, but no message",
 }
 _FAILURES: Final = zmq.Event.HANDSHAKE_FAILED_PROTOCOL | zmq.Event.HANDSHAKE_FAILED_NO_DETAIL
 _EVENTS: Final = (
@@ -32,9 +32,9 @@ _log = logging.getLogger(__name__)
 
 
 class AccessControl:
-    """Guards one socket of one context, on a thread of its own, until the context is terminated.
+    """Controls the access to one socket, on a thread of its own, until the socket's context is terminated.
 
-    With `keys` connections are encrypted, and only clients on the list, which may be edited at any time, come in.
+    With `keys`, connections are encrypted, and only clients on the list may connect. The list may change at any time.
     """
 
     def __init__(
@@ -45,13 +45,13 @@ class AccessControl:
         keys: ServerKeys | None = None,
         most: int = MOST_CONNECTIONS,
     ) -> None:
-        """Call before `socket` is bound. Raises `KeyFileError` for a list that cannot be read."""
+        """Call this before `socket` is bound. Raises `KeyFileError` for a list that cannot be read."""
         self._telemetry = telemetry
         self._clients = None if keys is None else ClientList(keys)
         self.connections = Connections(most, self._refuse)
         self._log_throttle = LogThrottle(_LOG_PERIOD_S)
         self._shaking, self._accepted_s = 0, float("-inf")
-        """Connections whose handshake has come to no end that is known, and when the newest was accepted."""
+        """The connections whose handshake has neither succeeded nor failed, and when the newest one was accepted."""
         self._zap: zmq.Socket | None = None
         if keys is not None:
             secure_server(socket, keys)
@@ -64,7 +64,7 @@ class AccessControl:
         self._thread.start()
 
     def join(self) -> None:
-        """Wait until its sockets are closed, after the context was told to terminate."""
+        """Wait until its own sockets are closed. Call this once the context is being terminated."""
         self._thread.join()
 
     def _run(self) -> None:
@@ -102,12 +102,12 @@ class AccessControl:
                 self.connections.closed(message["value"])
             case zmq.Event.LISTENING:
                 self.connections.listening(int(message["endpoint"].rpartition(b":")[2]))
-            case _:  # no key, a wrong server key, no CURVE
+            case _:  # the client has no key, the wrong server key or no CURVE
                 self._shaking -= 1
                 self._refuse("handshake")
 
     def _count_silent_failures(self, now_s: float) -> None:
-        """Count who does not speak ZeroMQ at all: there is no event of such, they only lack the one of success."""
+        """Count clients that do not speak ZeroMQ: they cause no event, but the event of success is missing."""
         if self._shaking and now_s - self._accepted_s > 2e-3 * HANDSHAKE_MS:
             for _ in range(self._shaking):
                 self._refuse("handshake")
@@ -123,4 +123,4 @@ class AccessControl:
     def _refuse(self, reason: str) -> None:
         self._telemetry.count("connections_refused", reason=reason)
         if self._log_throttle.admit(reason) is not None:
-            _log.warning("kept out (%s) %s", reason, _REFUSED[reason])
+            _log.warning("refused (%s) %s", reason, _REFUSED[reason])

@@ -1,8 +1,8 @@
-"""The connections of one bound ZeroMQ socket: how many there are, and what each sends that never becomes a message.
+"""Limits the connections of a bound ZeroMQ socket: their number, and what each sends without completing a message.
 
-ZeroMQ bounds a frame, and how many messages wait; it bounds neither connections nor the frames of one message. Each
-connection's own descriptor tells both. A descriptor may be closed and given to something else at any time, so none is
-touched that is no connection to the socket's own port.
+ZeroMQ limits the size of a frame and the number of messages that wait, but neither the number of connections nor the
+number of frames in a message. The descriptor of each connection tells both. A descriptor may be closed and reused at
+any time, so it is used only if it is a connection to the socket's own port.
 """
 
 import socket
@@ -12,17 +12,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 MAX_UNDELIVERED_BYTES = 4 << 20
-"""What may arrive from one connection before a message of it is complete; the largest message has a sixteenth."""
+"""Bytes that may arrive from one connection before a message is complete, 16 times the largest message."""
 SMALL_TALK_BYTES = 1_024
-"""What heartbeats and subscriptions may add between two looks."""
+"""Bytes that heartbeats and subscriptions may add between two checks."""
 _TCP_INFO, _RECEIVED_AT, _INFO_BYTES = 11, 128, 136  # struct tcp_info: tcpi_bytes_received, Linux 4.1
 
 Refuse = Callable[[str], None]
-"""Told why a connection was cut off: `too_many` or `endless`."""
+"""Called with the reason why a connection was closed: `too_many` or `endless`."""
 
 
 class Connections:
-    """Who is connected, kept from the socket's events. One thread calls everything but `delivered` and `len`."""
+    """The open connections, as the socket's events tell. One thread calls everything but `delivered` and `len`."""
 
     def __init__(self, most: int, refuse: Refuse) -> None:
         self._most, self._refuse = most, refuse
@@ -39,7 +39,7 @@ class Connections:
         self._port = port
 
     def opened(self, descriptor: int) -> bool:
-        """A connection was accepted; one too many is cut off at once, which makes it False."""
+        """Add a connection that was accepted. Returns False if it is one too many, which is closed at once."""
         if len(self._received) >= self._most:
             self._cut(descriptor, "too_many")
             return False
@@ -47,16 +47,16 @@ class Connections:
         return True
 
     def closed(self, descriptor: int) -> None:
-        """A connection has ended."""
+        """Remove a connection that has ended."""
         self._received.pop(descriptor, None)
         self._undelivered.pop(descriptor, None)
 
     def delivered(self, descriptor: int) -> None:
-        """A whole message of a connection was read. From any thread."""
+        """Note that a whole message of a connection was read. From any thread."""
         self._delivered.add(descriptor)
 
     def look(self) -> None:
-        """Cut off who has sent much that is no message yet. Call a few times a second."""
+        """Close connections that have sent too much without completing a message. Call this a few times a second."""
         delivered, self._delivered = self._delivered, set()
         for descriptor, before in list(self._received.items()):
             received = self._received_by(descriptor)
@@ -70,12 +70,12 @@ class Connections:
     def _cut(self, descriptor: int, reason: str) -> None:
         self._refuse(reason)
         with self._borrowed(descriptor) as connection:
-            if connection is not None:  # a reset: what is still under way is worth no memory
+            if connection is not None:  # a reset, so that what is still in transit takes no memory
                 connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
                 connection.shutdown(socket.SHUT_RDWR)
 
     def _received_by(self, descriptor: int) -> int:
-        """Bytes that ever came, or as many as before where the system does not tell."""
+        """All bytes that have arrived, or as many as before if the system does not tell."""
         if sys.platform == "linux":
             with self._borrowed(descriptor) as connection:
                 if connection is not None:
@@ -85,7 +85,7 @@ class Connections:
 
     @contextmanager
     def _borrowed(self, descriptor: int) -> Iterator[socket.socket | None]:
-        """The connection as a socket that does not own it; None where it is gone, also while it is used."""
+        """The connection as a socket that does not own it, or None if it has ended. It may end while it is used."""
         connection = self._ours(descriptor)
         try:
             yield connection

@@ -1,8 +1,8 @@
-"""Keys for ZeroMQ's CURVE encryption: the server's pair, one pair per client, and the list of who may come in.
+"""Keys for ZeroMQ's CURVE encryption: the server's pair, a pair for each client, and the list of allowed clients.
 
-A folder holds them: `server.toml` (secret), `NAME.toml` for each client (secret; to be carried to the client's
-machine), and `clients.allow`, one line `public-key name` per client. A line taken out keeps that client out from its
-next connection on.
+They are in one folder: `server.toml` (secret), `NAME.toml` for each client (secret, to be moved to the client's
+machine), and `clients.allow`, with one line `public-key name` for each client. Once its line is deleted, a client
+cannot connect again.
 """
 
 import os
@@ -20,7 +20,7 @@ MAX_FILE_BYTES = 1 << 20
 
 
 class KeyFileError(ValueError):
-    """Keys cannot be read or made; the text names the file, what is wrong and the remedy."""
+    """Keys cannot be read or made. The text names the file, what is wrong and the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,12 @@ class KeyPair:
     secret: str
 
     def __repr__(self) -> str:
-        return f"KeyPair(public={self.public!r})"  # a secret must not get into a log
+        return f"KeyPair(public={self.public!r})"  # the secret must not appear in a log
 
 
 @dataclass(frozen=True, slots=True)
 class ServerKeys:
-    """The server's own pair, and the file that lists its clients."""
+    """The server's own pair, and the file that lists the allowed clients."""
 
     pair: KeyPair
     allow_file: Path
@@ -44,7 +44,7 @@ class ServerKeys:
 
 @dataclass(frozen=True, slots=True)
 class ClientKeys:
-    """A client's own pair, and the public key of the server it is for."""
+    """A client's own pair, and the public key of its server."""
 
     name: str
     pair: KeyPair
@@ -52,7 +52,7 @@ class ClientKeys:
 
 
 def make_server_keys(folder: Path) -> ServerKeys:
-    """Make the server's pair in `folder`; raises `KeyFileError` rather than replace one."""
+    """Make the server's pair in `folder`. Raises `KeyFileError` if there is one already."""
     folder.mkdir(parents=True, exist_ok=True)
     pair = _new_pair()
     _write_secret(folder / SERVER_FILE, {"public": pair.public, "secret": pair.secret})
@@ -61,9 +61,12 @@ def make_server_keys(folder: Path) -> ServerKeys:
 
 
 def make_client_keys(folder: Path, name: str) -> Path:
-    """Make a client's file in `folder` and put the client on the list; raises `KeyFileError`."""
+    """Make a client's file in `folder` and add the client to the list. Raises `KeyFileError`."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", name) or f"{name}.toml" == SERVER_FILE:
-        raise KeyFileError(f"{name!r} is no client name: letters, digits, '_', '-' and '.', at most 64, not 'server'")
+        raise KeyFileError(
+            f"{name!r} cannot be the name of a client; it must be 1 to 64 letters, digits, '_', '-' and '.', begin "
+            "with a letter or digit, and not be 'server'"
+        )
     server, pair = read_server_keys(folder), _new_pair()
     path = folder / f"{name}.toml"
     _write_secret(
@@ -75,52 +78,57 @@ def make_client_keys(folder: Path, name: str) -> Path:
 
 
 def read_server_keys(folder: Path) -> ServerKeys:
-    """The server's keys in `folder`; raises `KeyFileError`."""
+    """The server's keys in `folder`. Raises `KeyFileError`."""
     path = folder / SERVER_FILE
     if not path.exists():
-        raise KeyFileError(f"{path} does not exist; make it with `manipnet keys make server`")
+        raise KeyFileError(f"{path} does not exist; `manipnet keys make server` makes it")
     values = _read(path, "public", "secret")
     return ServerKeys(KeyPair(values["public"], values["secret"]), folder / ALLOW_FILE)
 
 
 def read_client_keys(path: Path) -> ClientKeys:
-    """A client's file; raises `KeyFileError`."""
+    """Read a client's file. Raises `KeyFileError`."""
     if not path.exists():
-        raise KeyFileError(f"{path} does not exist; it is made on the server by `manipnet keys make NAME`")
+        raise KeyFileError(f"{path} does not exist; `manipnet keys make NAME` makes it on the server")
     values = _read(path, "public", "secret", "server_public")
     return ClientKeys(path.stem, KeyPair(values["public"], values["secret"]), values["server_public"])
 
 
 def read_allow_list(path: Path) -> dict[str, str]:
-    """Names by public key; empty lines and what follows `#` at a line's start do not count. `KeyFileError`."""
+    """The names of the allowed clients by public key. Empty lines and lines that begin with `#` are ignored.
+
+    Raises `KeyFileError`.
+    """
     try:
         lines = path.read_bytes()[:MAX_FILE_BYTES].decode("ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise KeyFileError(f"cannot read {path}: {error}; it lists one `public-key name` per line") from None
+        raise KeyFileError(f"cannot read {path}: {error}; it must have one `public-key name` per line") from None
     listed = {}
     for number, line in enumerate(lines, 1):
         if not line.strip() or line.startswith("#"):
             continue
         key, _, name = line.strip().partition(" ")
         if not _is_key(key):
-            raise KeyFileError(f"{path}, line {number}: no public key of {KEY_CHARS} characters; `public-key name`")
+            raise KeyFileError(
+                f"{path}:{number}: the line must be `public-key name`, with a public key of {KEY_CHARS} characters"
+            )
         listed[key] = name.strip() or "unnamed"
     return listed
 
 
 def _new_pair() -> KeyPair:
     if not zmq.has("curve"):
-        raise KeyFileError("this build of ZeroMQ has no CURVE encryption; install pyzmq's own wheel")
+        raise KeyFileError("this build of ZeroMQ has no CURVE encryption; install the pyzmq wheel from PyPI")
     public, secret = zmq.curve_keypair()
     return KeyPair(public.decode(), secret.decode())
 
 
 def _write_secret(path: Path, values: dict[str, str]) -> None:
-    """A TOML file only its owner can read; Z85 has no quote and no backslash, so nothing needs escaping."""
+    """Write a TOML file that only its owner can read. Z85 text has no quotes or backslashes, so nothing is escaped."""
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError:
-        raise KeyFileError(f"{path} exists already; delete it first if its key shall be replaced") from None
+        raise KeyFileError(f"{path} already exists; delete it first to replace its key") from None
     with os.fdopen(handle, "w", encoding="ascii") as file:
         file.writelines(f'{key} = "{value}"\n' for key, value in values.items())
 
@@ -132,7 +140,7 @@ def _read(path: Path, *keys: str) -> dict[str, str]:
         raise KeyFileError(f"cannot read {path}: {error}") from None
     for key in keys:
         if not _is_key(values.get(key)):
-            raise KeyFileError(f"{path} has no {key!r} of {KEY_CHARS} Z85 characters; make it anew")
+            raise KeyFileError(f"{path} has no key {key!r} of {KEY_CHARS} Z85 characters; make it again")
     return values
 
 

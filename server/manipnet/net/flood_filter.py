@@ -1,7 +1,7 @@
-"""A flood stopped in the kernel, where a dropped datagram costs nanoseconds and no place in the socket's buffer.
+"""Stops a flood of datagrams in the kernel, where dropping one costs nanoseconds and no space in the socket's buffer.
 
-Linux lets a socket carry a small packet filter (classic BPF, no privileges needed): datagrams of known senders pass,
-of all others a random share. OtherInterfaces, and on IPv6, floods are only cut down by `guard.SourceRateLimiter`.
+On Linux, a socket can have a small packet filter (classic BPF, without privileges), which lets the datagrams of known
+senders pass, and a random share of all others. Elsewhere, and with IPv6, only `SourceRateLimiter` limits a flood.
 """
 
 import ctypes
@@ -12,8 +12,8 @@ import sys
 from collections.abc import Collection, Sequence
 
 FLOOD_PER_S = 5_000
-"""So many unread datagrams a second are a flood, and about as many still come through while it is held back: a
-new sender among them is then known within a tenth of a second."""
+"""More unread datagrams per second than this are a flood. About as many still pass while a flood is held back, so a new
+sender among them is known within about a tenth of a second."""
 WATCH_S = 0.25
 CALM_S = 2.0
 MAX_KNOWN = 16
@@ -34,12 +34,12 @@ class FloodFilter:
         self.engaged = False
 
     def engage(self, known: Sequence[tuple[str, int]], share: float) -> bool:
-        """Let `known` senders through, and of all others the random `share`; False where it cannot be done."""
+        """Let the `known` senders pass, and a random `share` of all others. Returns False if that is impossible."""
         if not self.possible:
             return False
         code = program(known[-MAX_KNOWN:], share)
         buffer = ctypes.create_string_buffer(code, len(code))
-        # struct sock_fprog: how many 8-byte instructions, and where they are
+        # struct sock_fprog: the number of 8-byte instructions, and their address
         value = struct.pack("HP", len(code) // 8, ctypes.addressof(buffer))
         try:
             self._udp.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, value)
@@ -50,14 +50,14 @@ class FloodFilter:
         return True
 
     def release(self) -> None:
-        """Let everything through again."""
+        """Let every datagram pass again."""
         if self.engaged:
             self._udp.setsockopt(socket.SOL_SOCKET, _SO_DETACH_FILTER, 0)
             self.engaged = False
 
 
 class FloodWatch:
-    """Engages a filter when more than `FLOOD_PER_S` datagrams go unread, and lifts it after `CALM_S` without."""
+    """Engages a filter when more than `FLOOD_PER_S` datagrams are not read, and releases it after `CALM_S`."""
 
     def __init__(self, kernel: FloodFilter) -> None:
         self._kernel = kernel
@@ -68,15 +68,15 @@ class FloodWatch:
 
     @property
     def engaged(self) -> bool:
-        """Whether what the kernel drops is the flood, not what the socket's buffer had no place for."""
+        """Whether the filter is engaged, so that the kernel drops a flood, not what overflows the buffer."""
         return self._kernel.engaged
 
     def add(self, count: int = 1) -> None:
-        """So many datagrams went unread: refused by the guard, or dropped by the filter."""
+        """Count datagrams that were not read, since the rate limiter refused them or the filter dropped them."""
         self._unread += count
 
     def look(self, now_s: float, known: Collection[tuple[str, int]]) -> None:
-        """Call often: engages the filter, adjusts it, lifts it, and lets a new one of `known` in at once."""
+        """Engage, adjust or release the filter, and let new senders in `known` pass at once. Call this often."""
         if now_s - self._looked_s >= WATCH_S:
             rate_hz = self._unread / (now_s - self._looked_s)
             self._looked_s, self._unread = now_s, 0
@@ -94,7 +94,7 @@ class FloodWatch:
 
 
 def program(known: Sequence[tuple[str, int]], share: float) -> bytes:
-    """The filter's instructions: `(code, jump if true, jump if false, value)`, 8 bytes each."""
+    """The instructions of the filter, 8 bytes each: `(code, jump if true, jump if false, value)`."""
     steps: list[tuple[int, int, int, int]] = []
     for host, port in known:
         steps += [

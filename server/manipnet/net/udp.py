@@ -1,4 +1,4 @@
-"""A bound UDP socket with a thread of its own: what OSC and NatNet have in common."""
+"""UDP sockets, and a thread that reads one; used by OSC and NatNet."""
 
 import contextlib
 import logging
@@ -15,9 +15,10 @@ from manipnet.net.errors import ListenError, cannot_listen
 
 Address = tuple[str, int]
 Receive = Callable[[bytes, Address, float], None]
-"""A datagram, where it came from, and when it was read (`time.monotonic`)."""
+"""Called with a datagram, its sender, and the time when it was read (`time.monotonic`)."""
 Idle = Callable[[float], float]
-"""Called after every datagram and when none came: does what is due, says in how many seconds again."""
+"""Called after each datagram, and when none has arrived, to do what is due. Returns when to be called again, in
+seconds."""
 
 RECEIVE_BUFFER_BYTES = 4 << 20
 DROPS_PERIOD_S = 0.2
@@ -26,10 +27,10 @@ _log = logging.getLogger(__name__)
 
 
 class UdpThread:
-    """Reads datagrams of one socket and hands them to `receive` until it is stopped.
+    """Reads the datagrams of one socket and passes them to `receive`, until it is stopped.
 
-    A blocking receive with a timeout in the kernel costs one call a datagram and needs no second descriptor
-    to be woken by. `lost` is called with the number of datagrams the kernel dropped (Linux only).
+    A blocking receive with a timeout in the kernel costs one call per datagram, and needs no second descriptor to wake
+    it. `lost` is called with the number of datagrams that the kernel dropped (on Linux only).
     """
 
     def __init__(self, udp: socket.socket, receive: Receive, idle: Idle, lost: Callable[[int], None]) -> None:
@@ -44,7 +45,7 @@ class UdpThread:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the thread and close the socket; returns within the longest idle time."""
+        """Stop the thread and close the socket. Returns within the longest idle time."""
         self._stopping.set()
         self._thread.join()
         self.socket.close()
@@ -60,14 +61,14 @@ class UdpThread:
                 now_s = time.monotonic()
                 self._receive(bytes(view[:size]), source[:2], now_s)
             except (BlockingIOError, TimeoutError, ConnectionResetError):
-                now_s = time.monotonic()  # nothing came, or (Windows) an earlier reply was refused
+                now_s = time.monotonic()  # nothing arrived, or (on Windows) an earlier reply was refused
             except OSError as error:
                 now_s = time.monotonic()
                 if not self._stopping.is_set():
                     _log.warning("UDP receive failed: %s", error)
-            except Exception:  # the thread outlives a bug in what it calls
+            except Exception:  # a bug in what it calls must not end the thread
                 now_s = time.monotonic()
-                _log.exception("a datagram was not digested")
+                _log.exception("a datagram could not be taken in")
             self._set_timeout(self._idle(now_s))
             if now_s - look_s > DROPS_PERIOD_S:
                 look_s = now_s
@@ -120,36 +121,36 @@ def resolve(host: str, port: int) -> Address:
 
 
 def join_multicast(group: str, port: int, interface: str) -> socket.socket:
-    """A UDP socket that hears `group:port` through the network card with the address `interface`, and nothing else.
+    """A UDP socket that receives only the multicast `group:port`, through the network card at the address `interface`.
 
-    Other programs on this machine may hear the same group. Raises `ListenError`.
+    Other programs on this machine may receive the same group. Raises `ListenError`.
     """
     udp = _socket(socket.AF_INET)
     try:
         udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         if sys.platform == "darwin":
             udp.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
-        udp.bind(("" if sys.platform == "win32" else group, port))  # Windows binds to no group
+        udp.bind(("" if sys.platform == "win32" else group, port))  # Windows cannot bind to a group
         membership = socket.inet_aton(group) + socket.inet_aton(interface)
         udp.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
     except OSError as error:
         udp.close()
         raise ListenError(
             f"cannot join multicast {group}:{port} on interface {interface}: {_reason(error)}; "
-            "name the address of the network card that faces the server"
+            "give the address of the network card that faces the server"
         ) from None
     return udp
 
 
 def local_address_towards(host: str, port: int) -> str:
-    """The address of the network card the system would use to reach `host`; raises `ListenError`."""
+    """The address of the network card through which the system would reach `host`. Raises `ListenError`."""
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
             udp.connect((host, port))  # sends nothing
             return udp.getsockname()[0]
     except OSError as error:
         raise ListenError(
-            f"no network card of this machine reaches {host}: {_reason(error)}; name its address as the interface"
+            f"no network card of this machine reaches {host}: {_reason(error)}; give the address of one to use"
         ) from None
 
 
@@ -166,7 +167,7 @@ def _reason(error: Exception) -> str:
 
 
 def kernel_drops(udp: socket.socket) -> int:
-    """Datagrams the kernel threw away because the socket's buffer was full; 0 where it does not tell."""
+    """The datagrams that the kernel dropped because the socket's buffer was full, or 0 if the system does not tell."""
     if sys.platform != "linux":
         return 0
     try:

@@ -1,6 +1,6 @@
-"""Who may connect over ZeroMQ: CURVE encryption, and an allow-list that is asked at every handshake (ZAP).
+"""Keys of ZeroMQ connections: CURVE encryption, and a list of allowed clients, checked at each handshake (ZAP).
 
-CURVE alone lets anybody in who knows the server's public key; the list does not.
+CURVE alone would let in every client that knows the server's public key.
 """
 
 import logging
@@ -16,10 +16,10 @@ _log = logging.getLogger(__name__)
 
 
 class ClientList:
-    """The clients on the list of `keys`, as it is at every handshake."""
+    """The clients on the list of `keys`, which is read again when it has changed."""
 
     def __init__(self, keys: ServerKeys) -> None:
-        """Raises `KeyFileError` for a list that cannot be read."""
+        """Raises `KeyFileError` if the list cannot be read."""
         read_allow_list(keys.allow_file)
         self._file = keys.allow_file
         self._listed: dict[str, str] = {}
@@ -36,7 +36,7 @@ class ClientList:
         return [version, request_id, b"200", b"OK", name.encode("ascii"), b""], True
 
     def _names(self) -> dict[str, str]:
-        """The list as it is now; an unreadable one lets nobody in."""
+        """The list as it is now. If it cannot be read, nobody may connect."""
         try:
             status = self._file.stat()
             stamp = (status.st_mtime_ns, status.st_size)
@@ -49,7 +49,7 @@ class ClientList:
 
 
 def secure_server(socket: zmq.Socket, keys: ServerKeys) -> None:
-    """Give a server's socket its keys. Call before it is bound."""
+    """Give a server's socket its keys. Call this before it is bound."""
     socket.setsockopt(zmq.CURVE_SERVER, 1)
     socket.setsockopt_string(zmq.CURVE_PUBLICKEY, keys.pair.public)
     socket.setsockopt_string(zmq.CURVE_SECRETKEY, keys.pair.secret)
@@ -57,7 +57,7 @@ def secure_server(socket: zmq.Socket, keys: ServerKeys) -> None:
 
 
 def secure_client(socket: zmq.Socket, keys: ClientKeys) -> None:
-    """Give a client's socket its keys. Call before it connects."""
+    """Give a client's socket its keys. Call this before it connects."""
     socket.setsockopt_string(zmq.CURVE_PUBLICKEY, keys.pair.public)
     socket.setsockopt_string(zmq.CURVE_SECRETKEY, keys.pair.secret)
     socket.setsockopt_string(zmq.CURVE_SERVERKEY, keys.server_public)

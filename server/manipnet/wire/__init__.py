@@ -1,6 +1,6 @@
-"""Hands out: the message, declared once (`schema`), and its two encodings.
+"""The messages of the protocol: bodies, which come in, and hands, which go out in two encodings.
 
-A ZeroMQ frame is a topic followed at once by a payload.
+A ZeroMQ frame of hands is a topic, with a space at its end, and a payload.
 """
 
 from manipnet.wire.binary_codec import decode_binary, encode_binary

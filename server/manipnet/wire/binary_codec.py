@@ -1,7 +1,7 @@
-"""The hands message as fixed little-endian records, the payload of the topic `pose/bin`.
+"""Encodes the hands message as fixed little-endian records, the payload of the topic `pose/bin`.
 
-A header, then a record per hand, then a record per body. Each record's size travels in the header, so a later
-writer may append fields and this reader steps over them.
+A header is followed by a record for each hand and a record for each body. The header has the sizes of the records, so a
+later writer may append fields, which this reader skips.
 """
 
 from typing import Any
@@ -31,9 +31,9 @@ from manipnet.wire.validation import check, require_version
 
 
 def encode_binary(message: HandsMessage) -> bytes:
-    """The fixed records of `docs/protocol.md`; names are cut to `NAME_BYTES`, at a character.
+    """Encode a message as the records of `docs/protocol.md`. Names are cut to `NAME_BYTES`, between two characters.
 
-    Raises `MessageError` rather than send a number that is not finite.
+    Raises `MessageError` for a message that breaks a rule, for example with a number that is not finite.
     """
     check(message)
     header = np.zeros((), HEADER)
@@ -55,7 +55,7 @@ def encode_binary(message: HandsMessage) -> bytes:
 
 
 def decode_binary(payload: bytes) -> HandsMessage:
-    """Inverse of `encode_binary`, to float32; longer records of a later writer are read by their known part.
+    """The inverse of `encode_binary`, up to float32. Of the longer records of a later writer, the known part is read.
 
     Raises `MessageError` and nothing else.
     """
@@ -67,7 +67,7 @@ def decode_binary(payload: bytes) -> HandsMessage:
         latency_ms=Latency(*(float(x) for x in header["latency_ms"].item())),
     )
     if len(message.hands) != len(hands):
-        raise MessageError("the same hand occurs twice; a message holds at most one left and one right hand")
+        raise MessageError("a hand occurs twice; a message has at most one left hand and one right hand")
     check(message)
     return message
 
@@ -75,7 +75,7 @@ def decode_binary(payload: bytes) -> HandsMessage:
 def _split_records(payload: bytes) -> tuple[np.void, list[np.void], list[np.void]]:
     """The known part of the header, of each hand and of each body."""
     if len(payload) < PREAMBLE.itemsize or payload[:4] != MAGIC:
-        raise MessageError(f"message does not start with {MAGIC.decode()} and a header; it is not pose/bin")
+        raise MessageError(f"the message does not begin with {MAGIC.decode()} and a header, so it is not pose/bin")
     pre = {name: int(value) for name, value in zip(_NUMBERS, _numbers(payload), strict=True)}
     require_version(pre["version"])
     for name, least in (("header", HEADER), ("hand", HAND), ("body", BODY)):
@@ -87,7 +87,7 @@ def _split_records(payload: bytes) -> tuple[np.void, list[np.void], list[np.void
     first_body = pre["header_size"] + pre["hand_count"] * pre["hand_size"]
     total = first_body + pre["body_count"] * pre["body_size"]
     if not len(payload) == total == pre["total_size"]:
-        raise MessageError(f"message has {len(payload)} bytes; its header promises {total}")
+        raise MessageError(f"the message has {len(payload)} bytes, but its header says {total}")
     return (
         np.frombuffer(payload, HEADER, 1)[0],
         _records(payload, HAND, pre["header_size"], pre["hand_size"], pre["hand_count"]),
@@ -114,7 +114,7 @@ def _hand(record: np.void, index: int) -> HandPose:
 
 
 def _fill(record: Any, value: Any) -> None:
-    """Copy a dataclass's fields into its record."""
+    """Copy the fields of a dataclass into its record."""
     for name, dtype in RECORDS[type(value)]:
         field_value = getattr(value, name)
         if dtype == NAME:
@@ -126,7 +126,7 @@ def _fill(record: Any, value: Any) -> None:
 
 
 def _read(cls: type, record: np.void, where: str) -> dict[str, Any]:
-    """A record's fields as a dataclass's keyword arguments."""
+    """The fields of a record as keyword arguments of its dataclass."""
     values: dict[str, Any] = {}
     for name, dtype in RECORDS[cls]:
         raw = record[name]

@@ -1,8 +1,7 @@
-"""Bodies in: the values every receiver produces, and the strict parser of msgpack and JSON messages.
+"""Body frames, which every receiver produces, and a strict parser of msgpack and JSON messages.
 
-A message that cannot be trusted as a whole (wrong type, size, structure, time) raises `MessageError`. One bad
-pose in a good message does not cost the others their frame: that body comes out untracked, with the `fault`
-that says why.
+A message that is wrong as a whole (in its type, size, structure or time) raises `MessageError`. One bad pose in a good
+message does not spoil the frame: that body becomes untracked, and its `fault` says why.
 """
 
 import json
@@ -18,26 +17,26 @@ MAX_BODIES = 256
 MAX_NAME_CHARS = 128
 MAX_COORDINATE_M = 1_000.0
 MAX_TIME_S = 1e10
-"""Seconds up to the year 2286: a time beyond it was sent in milliseconds or nanoseconds."""
+"""The seconds up to the year 2286. A larger time was sent in milliseconds or nanoseconds."""
 
 _FLOATS = {float}
 _FAR = MAX_COORDINATE_M
-_SMALLEST, _LARGEST = 1e-12, 1e12  # a quaternion's squared length; beyond, it says nothing about a rotation
+_SMALLEST, _LARGEST = 1e-12, 1e12  # limits of a quaternion's squared length, beyond which it gives no rotation
 
 FAULTS = ("nan", "bounds", "zero_quaternion")
-"""Why a pose is unusable: a number is not finite, a position is outside any stage, no rotation is given."""
+"""Why a pose cannot be used: a number is not finite, the position is out of bounds, or there is no rotation."""
 
 
 class MessageError(ValueError):
-    """A message that cannot be used; the text names what was wrong, where, and what is allowed."""
+    """A message that cannot be used. The text names what is wrong, where, and what is allowed."""
 
 
 @dataclass(frozen=True, slots=True)
 class BodySample:
     """One body at one instant, in the project frame (right-handed, Y up, metres, xyzw).
 
-    `q` is a unit quaternion. Where `tracked` is false, `p` and `q` are not to be used. `fault` is one of
-    `FAULTS` when a pose was sent that nobody can use; such a body is untracked, at the origin, unrotated.
+    `q` is a unit quaternion. If `tracked` is false, `p` and `q` must not be used. `fault` is one of `FAULTS` if the
+    pose that was sent cannot be used; such a body is untracked, at the origin and without rotation.
     """
 
     id: int | None
@@ -50,9 +49,9 @@ class BodySample:
 
 @dataclass(frozen=True, slots=True)
 class BodyFrame:
-    """The bodies of one instant: `t_s` on the sender's clock, `t_received_s` on ours (`time.monotonic`).
+    """The bodies at one instant: `t_s` on the sender's clock, `t_received_s` on ours (`time.monotonic`).
 
-    `source` tells senders apart: its protocol, a colon, what is known of its address ("osc:10.0.0.7:50123").
+    `source` identifies the sender: its protocol, a colon, and its address, for example "osc:10.0.0.7:50123".
     """
 
     t_s: float
@@ -63,13 +62,13 @@ class BodyFrame:
 
 
 def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
-    """Read one msgpack map or JSON object of `docs/protocol-in.md`; raises only `MessageError`."""
+    """Read a msgpack map or a JSON object, as `docs/protocol-in.md` describes them. Raises only `MessageError`."""
     message = _decode(payload)
     if not isinstance(message, dict):
-        raise MessageError(f"message is {_kind(message)}; it must be a map with the keys t, frame and bodies")
+        raise MessageError(f"the message is {_kind(message)}; it must be a map with the keys t, frame and bodies")
     t_s = _number(message, "t", "message")
     if not abs(t_s) <= MAX_TIME_S:
-        raise MessageError(f"t is {t_s}; it must be seconds, finite, at most {MAX_TIME_S:g} (no milliseconds)")
+        raise MessageError(f"t is {t_s}; it must be finite, in seconds (not milliseconds), and at most {MAX_TIME_S:g}")
     frame = message.get("frame")
     if frame is not None and not _is_int(frame, 63):
         raise MessageError(f"frame is {_show(frame)}; it must be an integer of at most 63 bits")
@@ -84,7 +83,7 @@ def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
 
 
 def bodies_map(frame: BodyFrame) -> dict[str, Any]:
-    """Inverse of `parse_bodies`, before it is packed as msgpack or JSON."""
+    """The map that `parse_bodies` reads from msgpack or JSON."""
     return {"t": frame.t_s, "frame": frame.frame, "bodies": [_sample_map(body) for body in frame.bodies]}
 
 
@@ -97,30 +96,30 @@ def _sample_map(body: BodySample) -> dict[str, Any]:
 def make_sample(
     id: int | None, name: str | None, p: tuple[float, ...], q: tuple[float, ...], tracked: bool
 ) -> BodySample:
-    """A sample with a unit quaternion from three and four floats, or an untracked one with its fault."""
+    """A sample with a unit quaternion from three and four floats, or an untracked sample with its fault."""
     px, py, pz = p
     x, y, z, w = q
     squared = x * x + y * y + z * z + w * w
-    # Comparisons with NaN are false: one chain of them finds every fault.
+    # Comparisons with NaN are false, so this one condition finds every fault.
     if _SMALLEST < squared < _LARGEST and -_FAR <= px <= _FAR and -_FAR <= py <= _FAR and -_FAR <= pz <= _FAR:
         n = 1.0 / math.sqrt(squared)
         return BodySample(id, name, (px, py, pz), (x * n, y * n, z * n, w * n), tracked)
-    # A lost body is often sent as zeros or NaN: saying "lost" is no fault, claiming "tracked" with it is.
+    # A lost body is often sent as zeros or NaN, which is a fault only if it is also said to be tracked.
     fault = _fault(p, q) if tracked else None
     return BodySample(id, name, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), tracked=False, fault=fault)
 
 
 def check_distinct(bodies: tuple[BodySample, ...]) -> None:
-    """Raise `MessageError` when two bodies of one frame share an id or a name."""
+    """Raise `MessageError` if two bodies of a frame have the same id or name."""
     for key, values in ("id", [body.id for body in bodies]), ("name", [body.name for body in bodies]):
         given = [value for value in values if value is not None]
         if len(set(given)) < len(given):
             twice = next(value for i, value in enumerate(given) if value in given[:i])
-            raise MessageError(f"bodies have the {key} {twice!r} twice; each body may appear once per frame")
+            raise MessageError(f"two bodies have the {key} {twice!r}; each body may occur once per frame")
 
 
 def check_name(name: object, where: str) -> str:
-    """A body name: 1 to `MAX_NAME_CHARS` printable characters, so it can be logged as it is."""
+    """The name of a body, if it is 1 to `MAX_NAME_CHARS` printable characters, which can be logged as they are."""
     if not isinstance(name, str) or not 0 < len(name) <= MAX_NAME_CHARS or not name.isprintable():
         allowed = f"1 to {MAX_NAME_CHARS} printable characters"
         raise MessageError(f"{where} is {_show(name)}; it must be text of {allowed}")
@@ -129,7 +128,7 @@ def check_name(name: object, where: str) -> str:
 
 def _decode(payload: bytes) -> Any:
     if len(payload) > MAX_MESSAGE_BYTES:
-        raise MessageError(f"message has {len(payload)} bytes; at most {MAX_MESSAGE_BYTES} are allowed")
+        raise MessageError(f"the message has {len(payload)} bytes; at most {MAX_MESSAGE_BYTES} are allowed")
     text = payload.lstrip(b" \t\r\n")
     try:
         if text.startswith((b"{", b"[")):
@@ -137,7 +136,7 @@ def _decode(payload: bytes) -> Any:
         return msgpack.unpackb(payload, max_array_len=MAX_BODIES, max_map_len=MAX_BODIES)
     except (ValueError, TypeError, OverflowError, RecursionError, msgpack.UnpackException) as error:
         reason = str(error)[:120] or type(error).__name__
-        raise MessageError(f"message is neither a msgpack map nor a JSON object: {reason}") from None
+        raise MessageError(f"the message is neither a msgpack map nor a JSON object: {reason}") from None
 
 
 def _body(entry: object, where: str) -> BodySample:
@@ -145,7 +144,7 @@ def _body(entry: object, where: str) -> BodySample:
         raise MessageError(f"{where} is {_kind(entry)}; it must be a map with id or name, p and q")
     id, name = entry.get("id"), entry.get("name")
     if id is None and name is None:
-        raise MessageError(f"{where} has neither id nor name; at least one is needed")
+        raise MessageError(f"{where} has neither id nor name; it must have at least one of them")
     if id is not None and not _is_int(id, 31):
         raise MessageError(f"{where}.id is {_show(id)}; it must be an integer of at most 31 bits")
     if name is not None:
@@ -194,7 +193,7 @@ def _kind(value: object) -> str:
 
 
 def _show(value: object) -> str:
-    """A short, printable picture of a hostile value: never a whole message in an error text."""
+    """A short, printable form of a value, so that an error text never contains a whole message."""
     if isinstance(value, list | dict):
         return f"a {type(value).__name__} of {len(value)}"
     if isinstance(value, str | bytes) and len(value) > 40:

@@ -1,7 +1,7 @@
 """The hands message, declared once.
 
-The dataclasses below are the schema. The type of each field carries its place in the binary record, so the
-layout in `docs/protocol.md` and the constants of the readers in other languages follow from them.
+The dataclasses below are the schema. The type of each field includes its type in the binary record, so the layout in
+`docs/protocol.md` and the constants of the readers in other languages follow from them.
 Right-handed, Y up, metres, seconds, radians, quaternions xyzw.
 """
 
@@ -18,7 +18,7 @@ TOPIC_MSGPACK: Final = b"pose/msgpack "
 TOPIC_BIN: Final = b"pose/bin "
 MAX_PAYLOAD_BYTES: Final = 131_072
 NAME_BYTES: Final = 63
-"""Longest name in the binary encoding, in bytes of UTF-8; msgpack carries names of any length."""
+"""The longest name in the binary encoding, in bytes of UTF-8. Names in msgpack may have any length."""
 
 Side = Literal["left", "right"]
 State = Literal["live", "hold", "rest"]
@@ -37,9 +37,9 @@ Pose = Annotated[Array, np.dtype(("<f4", (7,)))]
 class HandPose:
     """One hand at one instant.
 
-    `angles (20,)` in the order of `skeleton.DOF_NAMES`; `rotations (17, 4)` local to the parent bone, the
-    wrist's being the identity, mirrored (S R S) for a left hand; `wrist (7,)` and `joints (26, 7)`, in
-    OpenXR order, in the world.
+    `angles (20,)` are in the order of `skeleton.DOF_NAMES`. `rotations (17, 4)` are local to the parent bone, with the
+    identity for the wrist, and mirrored (S R S) for a left hand. `wrist (7,)` and `joints (26, 7)`, in OpenXR order,
+    are world poses.
     """
 
     state: Annotated[State, np.dtype("u1")]
@@ -53,7 +53,7 @@ class HandPose:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyPose:
-    """A tracked body as the server saw it at the synthesised instant: `pose (7,)` in the world."""
+    """A tracked body at the synthesised instant: `pose (7,)` in the world."""
 
     tracked: Annotated[bool, np.dtype("u1")]
     pose: Pose
@@ -62,7 +62,7 @@ class BodyPose:
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """Where the time went, milliseconds."""
+    """The delay of each stage, in milliseconds."""
 
     buffer: Float = 0.0
     sense: Float = 0.0
@@ -73,10 +73,10 @@ class Latency:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandsMessage:
-    """Everything the server says about one actor at one instant.
+    """The hands of one actor at one instant.
 
-    `t_capture` is the synthesised instant on the sender's clock, `t_publish` the server's monotonic clock;
-    `seq` rises by one per message of an actor.
+    `t_capture` is the synthesised instant on the sender's clock, and `t_publish` the time of sending on the server's
+    monotonic clock. `seq` rises by one with each message of an actor.
     """
 
     session: Name
@@ -95,7 +95,7 @@ Record = list[tuple[str, np.dtype]]
 
 
 def _record(cls: type) -> Record:
-    """The fields of a dataclass that have a place in its binary record, in order."""
+    """The fields of a dataclass that are part of its binary record, in order."""
     hints = get_type_hints(cls, include_extras=True)
     named = ((f.name, getattr(hints[f.name], "__metadata__", ())) for f in fields(cls))
     return [(name, metadata[0]) for name, metadata in named if metadata]
@@ -115,7 +115,7 @@ PREAMBLE: Final = np.dtype(
         ("body_count", "<u2"),
     ]
 )
-"""How every binary message starts, whatever its version."""
+"""The beginning of every binary message, in all versions."""
 
 LATENCY: Final = np.dtype(RECORDS[Latency])
 HEADER: Final = np.dtype([*PREAMBLE.descr, *RECORDS[HandsMessage], ("latency_ms", LATENCY)], align=True)

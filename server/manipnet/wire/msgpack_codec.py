@@ -1,4 +1,4 @@
-"""The hands message as a msgpack map, the payload of the topic `pose/msgpack`."""
+"""Encodes the hands message as a msgpack map, the payload of the topic `pose/msgpack`."""
 
 from dataclasses import fields
 from typing import Any
@@ -12,9 +12,10 @@ from manipnet.wire.validation import check, known_side, require_version
 
 
 def encode_msgpack(message: HandsMessage, checked: bool = False) -> bytes:
-    """The map of `docs/protocol.md`; raises `MessageError` rather than send a number that is not finite.
+    """Encode a message as the map of `docs/protocol.md`.
 
-    `checked` says that another encoder has just checked the same message.
+    `checked` means that another encoder has just checked the same message. Raises `MessageError` for a message that
+    breaks a rule, for example with a number that is not finite.
     """
     if not checked:
         check(message)
@@ -37,14 +38,14 @@ def encode_msgpack(message: HandsMessage, checked: bool = False) -> bytes:
 
 
 def decode_msgpack(payload: bytes) -> HandsMessage:
-    """Inverse of `encode_msgpack`; unknown keys are ignored. Raises `MessageError` and nothing else."""
+    """The inverse of `encode_msgpack`. Unknown keys are ignored. Raises `MessageError` and nothing else."""
     if len(payload) > MAX_PAYLOAD_BYTES:
-        raise MessageError(f"message has {len(payload)} bytes; at most {MAX_PAYLOAD_BYTES} are allowed")
+        raise MessageError(f"the message has {len(payload)} bytes; at most {MAX_PAYLOAD_BYTES} are allowed")
     try:
         top = msgpack.unpackb(payload, strict_map_key=True)
-    except Exception as error:  # msgpack raises a dozen unrelated types for malformed bytes
-        raise MessageError(f"message is not msgpack: {error or type(error).__name__}") from None
-    top = _typed(top, dict, "message", "a map")
+    except Exception as error:  # msgpack raises a dozen unrelated exceptions for malformed bytes
+        raise MessageError(f"the message is not msgpack: {error or type(error).__name__}") from None
+    top = _typed(top, dict, "the message", "a map")
     require_version(top.get("v"))
     hands = _get(top, "hands", dict)
     latency = _get(top, "latency_ms", dict)
@@ -128,5 +129,5 @@ def _array(value: Any, shape: tuple[int, ...], where: str) -> Array:
     except ValueError:
         array = np.empty(0, object)
     if array.dtype.kind not in "fiu" or array.shape != shape:
-        raise MessageError(f"{where} must be numbers of the shape {shape}")
+        raise MessageError(f"{where} must be an array of numbers of the shape {shape}")
     return array.astype(np.float64)

@@ -1,4 +1,4 @@
-"""What a hands message may hold, checked on the way out and on the way in."""
+"""Checks a hands message, before it is sent and after it is received."""
 
 from dataclasses import fields
 from typing import Any
@@ -20,10 +20,10 @@ from manipnet.wire.hands import (
 
 
 def check(message: HandsMessage) -> None:
-    """Raise `MessageError` unless all is allowed: finite, right shapes, unit quaternions, known words."""
+    """Raise `MessageError` unless numbers are finite, shapes right, quaternions of unit length, and words known."""
     require_version(message.v)
     if not 0 <= message.seq < 2**64:
-        raise MessageError(f"seq is {message.seq}; it must lie in 0 … 2^64 - 1")
+        raise MessageError(f"seq is {message.seq}; it must be 0 … 2^64 - 1")
     if len(message.bodies) > MAX_BODIES:
         raise MessageError(f"bodies has {len(message.bodies)} entries; at most {MAX_BODIES} are allowed")
     numbers = (message.t_capture, message.t_publish, message.look_ahead)
@@ -53,24 +53,24 @@ def _check_hand(hand: HandPose, where: str) -> None:
 def _check_floats(value: Array, shape: tuple[int, ...], where: str) -> None:
     if value.shape != shape:
         raise MessageError(f"{where} has the shape {value.shape}; it must be {shape}")
-    if not (np.abs(value) <= 1e12).all():  # NaN is not
-        raise MessageError(f"{where} holds a number that is not finite or beyond 1e12")
+    if not (np.abs(value) <= 1e12).all():  # false for NaN too
+        raise MessageError(f"{where} contains a number that is not finite or is beyond 1e12")
 
 
 def _check_units(quats: Array, where: str) -> None:
     lengths = np.einsum("...i,...i->...", quats, quats)
     if np.abs(lengths - 1.0).max() > 1e-3:
-        raise MessageError(f"{where} holds a quaternion that is not of unit length")
+        raise MessageError(f"{where} contains a quaternion that is not of unit length")
 
 
 def require_version(version: Any) -> None:
-    """Refuse another version, naming both."""
+    """Raise `MessageError`, which names both versions, for any other version."""
     if version != VERSION or isinstance(version, bool):
         raise MessageError(f"message is of version {version!r}; this reader understands version {VERSION}")
 
 
 def known_side(side: Any) -> Side:
-    """The side itself, or `MessageError`."""
+    """The side, if it is one. Raises `MessageError` otherwise."""
     if side not in SIDES:
         raise MessageError(f"hands has the key {side!r}; allowed are {', '.join(SIDES)}")
     return side

@@ -8,20 +8,20 @@ from manipnet_tools.commands.keys import default_folder, main
 
 @pytest.fixture
 def keys(tmp_path, capsys):
-    """Runs the command on a fresh folder; gives status and what was said."""
+    """Runs the command on a new folder. Returns its status and its output."""
 
     def run(*words):
         status = main(["--folder", str(tmp_path / "keys"), *words])
-        said = capsys.readouterr()
-        return status, said.out + said.err
+        output = capsys.readouterr()
+        return status, output.out + output.err
 
     run.folder = tmp_path / "keys"
     return run
 
 
 def test_from_nothing_to_a_listed_client(keys):
-    status, said = keys("list")
-    assert (status, "manipnet keys make server" in said) == (1, True)
+    status, output = keys("list")
+    assert (status, "manipnet keys make server" in output) == (1, True)
     assert keys("make", "server")[0] == 0
     assert "no client may connect yet" in keys("list")[1]
     assert keys("make", "stage-pc")[0] == 0
@@ -31,12 +31,14 @@ def test_from_nothing_to_a_listed_client(keys):
     assert list(read_allow_list(keys.folder / "clients.allow").values()) == ["stage-pc"]
 
 
-@pytest.mark.parametrize(("words", "says"), [(("make", "../x"), "no client name"), (("make", "a"), "make server")])
-def test_what_cannot_be_made_is_said(keys, words, says):
-    if says != "make server":
+@pytest.mark.parametrize(
+    ("words", "expected"), [(("make", "../x"), "cannot be the name of a client"), (("make", "a"), "make server")]
+)
+def test_what_cannot_be_made_is_reported(keys, words, expected):
+    if expected != "make server":
         keys("make", "server")
-    status, said = keys(*words)
-    assert (status, says in said) == (1, True)
+    status, output = keys(*words)
+    assert (status, expected in output) == (1, True)
 
 
 def test_a_folder_of_the_user_is_the_default():

@@ -1,4 +1,4 @@
-"""`manipnet rig`: who is a wrist, by name or by motion, the file that comes of it, and what is refused."""
+"""`manipnet rig`: it finds the wrists by name or by motion, writes a file, and refuses what it cannot do."""
 
 import threading
 from pathlib import Path
@@ -17,7 +17,7 @@ from manipnet_tools.commands.rig_guess import BodyCollector, guess, rig_of
 
 
 def heard(*bodies: tuple[int | None, str | None, float]):
-    """Bodies by id, name, and the speed they go to and fro with for three seconds, within the noise of a tracker."""
+    """Bodies by id, name, and the speed at which they move back and forth for three seconds, with a tracker's noise."""
     listener, rng = BodyCollector(), np.random.default_rng(3)
     for i in range(360):
         samples = tuple(
@@ -56,7 +56,7 @@ def test_what_is_given_is_not_guessed() -> None:
     assert {part: key for part, (key, _) in found.wrists.items()} == {"left_wrist": 1, "right_wrist": 2}
 
 
-def test_when_nothing_tells_the_wrists_the_remedy_is_named() -> None:
+def test_without_a_wrist_the_remedy_is_named() -> None:
     with pytest.raises(
         ConfigError,
         match=r"arrived: Box, 2\); wave both hands while this command listens, the right hand more",
@@ -64,7 +64,7 @@ def test_when_nothing_tells_the_wrists_the_remedy_is_named() -> None:
         guess(heard((None, "Box", 0.0), (2, None, 0.0)), {})
 
 
-def test_the_rig_is_one_and_strange_bodies_stay_as_comments(tmp_path: Path) -> None:
+def test_the_rig_can_be_read_and_unknown_bodies_stay_as_comments(tmp_path: Path) -> None:
     found = guess(
         heard((1, "LeftHand", 0.0), (2, "RightHand", 0.0), (3, "Mug 2", 0.0), (4, 'My "Head"', 0.0), (5, "Box", 0.0)),
         {},
@@ -105,7 +105,7 @@ class Waving:
 
 
 @pytest.mark.slow
-def test_init_listens_and_writes_and_replaces_only_when_told(tmp_path: Path, capsys, monkeypatch) -> None:
+def test_init_listens_and_writes_and_replaces_a_file_only_with_force(tmp_path: Path, capsys, monkeypatch) -> None:
     waving, path = Waving(), tmp_path / "rig.toml"
     waited = threading.Event.wait
 
@@ -121,8 +121,8 @@ def test_init_listens_and_writes_and_replaces_only_when_told(tmp_path: Path, cap
         assert cli.main(command) == 0
     finally:
         waving.stop()
-    said = capsys.readouterr().out
-    assert "right_wrist: 2 (it moved" in said
+    output = capsys.readouterr().out
+    assert "right_wrist: 2 (it moved" in output
     assert {part: body.key for part, body in load_rig(path).actors[0].wrists.items()} == {
         "left_wrist": 1,
         "right_wrist": 2,
@@ -138,7 +138,7 @@ def test_init_listens_and_writes_and_replaces_only_when_told(tmp_path: Path, cap
     assert load_rig(path).actors[0].wrists["left_wrist"].key == "Anna"
 
 
-def test_init_that_hears_nothing_writes_nothing(tmp_path: Path, capsys) -> None:
+def test_init_writes_nothing_if_nothing_arrives(tmp_path: Path, capsys) -> None:
     command = ["rig", "init", str(tmp_path / "rig.toml"), "--input-port", "0", "--osc-port", "0", "--seconds", "0.01"]
     assert cli.main(command) == 1
     assert "nothing arrived within 0.01 s; `manipnet doctor` says why" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""`manipnet doctor`: the reasoning as tables, and the command over real sockets."""
+"""`manipnet doctor`: its reasoning, and the command over real sockets."""
 
 import itertools
 import socket
@@ -23,7 +23,7 @@ PARTS = {"left_wrist": "left_wrist", "right_wrist": 2}
 
 
 def stream(*bodies, rate_hz=120.0, seconds=2.0, clock=1.0, source="osc:a"):
-    """What one sender sent: bodies as `(id, name, tracked)`."""
+    """The traffic of one sender, with its bodies as `(id, name, tracked)`."""
     heard = SourceTraffic()
     samples = tuple(BodySample(id, name, (0, 1, 0), (0, 0, 0, 1), tracked) for id, name, tracked in bodies)
     for n in range(round(rate_hz * seconds)):
@@ -45,7 +45,7 @@ def test_a_good_stream_has_no_problem():
 
 
 @pytest.mark.parametrize(
-    ("sources", "dropped", "says"),
+    ("sources", "dropped", "expected"),
     [
         ({}, {}, ["nothing arrives at all → is the sender running, and does it send to udp://127.0.0.1:39540"]),
         (
@@ -74,13 +74,13 @@ def test_a_good_stream_has_no_problem():
         ),
     ],
 )
-def test_problems_are_named_with_their_remedy(sources, dropped, says):
+def test_problems_are_named_with_their_remedy(sources, dropped, expected):
     found = " | ".join(problems(sources, dropped))
-    for words in says:
+    for words in expected:
         assert words in found
 
 
-def test_what_the_reader_said_is_passed_on():
+def test_the_log_of_the_receivers_is_passed_on():
     (found, _) = problems({}, {"malformed": 2}, ["osc:a dropped (malformed): bad address"])
     assert "osc:a dropped (malformed): bad address" in found
 
@@ -113,22 +113,22 @@ def test_a_port_in_use(ports, capsys):
     with socket.socket(type=socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", port(ports, "--osc-port")))
         assert doctor.main([*ports, "--seconds=0.1"]) == 1
-    said = capsys.readouterr().out
-    assert "cannot listen on udp://" in said
-    assert "ss -lntup" in said
+    output = capsys.readouterr().out
+    assert "cannot listen on udp://" in output
+    assert "ss -lntup" in output
 
 
 @pytest.mark.parametrize(
-    ("options", "says"),
+    ("options", "expected"),
     [
         (["--host=203.0.113.9"], "name an address of this machine: 127.0.0.1"),
         (["--natnet=127.0.0.1", "--interface=203.0.113.9"], "name an address of this machine: 127.0.0.1"),
         (["--natnet=192.0.2.1", "--interface=127.0.0.1"], "cannot send to 192.0.2.1"),
     ],
 )
-def test_a_wrong_interface(ports, capsys, options, says):
+def test_a_wrong_interface(ports, capsys, options, expected):
     assert doctor.main([*ports, "--seconds=0.2", *options]) == 1
-    assert says in capsys.readouterr().out
+    assert expected in capsys.readouterr().out
 
 
 def test_packets_for_another_address_of_this_machine(ports, capsys, monkeypatch):
@@ -142,13 +142,13 @@ def test_packets_for_another_address_of_this_machine(ports, capsys, monkeypatch)
 
     monkeypatch.setattr(doctor, "listen", send)
     assert doctor.main([*ports]) == 1
-    said = capsys.readouterr().out
-    assert f"3 packets or connections came to 127.0.0.2:{osc}, but the server listens on 127.0.0.1" in said
-    assert f"1 packets or connections came to 127.0.0.2:{bodies}" in said
-    assert "start the server with --host 127.0.0.2" in said
+    output = capsys.readouterr().out
+    assert f"3 packets or connections came to 127.0.0.2:{osc}, but the server listens on 127.0.0.1" in output
+    assert f"1 packets or connections came to 127.0.0.2:{bodies}" in output
+    assert "start the server with --host 127.0.0.2" in output
 
 
-def test_a_server_with_keys_is_asked_with_one(ports, capsys, monkeypatch, tmp_path):
+def test_a_server_with_keys_is_asked_with_a_key(ports, capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
     make_server_keys(tmp_path)
     path = make_client_keys(tmp_path, "stage-pc")
@@ -188,20 +188,20 @@ def test_bodies_that_arrive_are_compared_with_the_rig(ports, capsys):
     assert doctor.main([*ports, "--seconds=1"]) == 1
     stop.set()
     thread.join()
-    said = capsys.readouterr().out
-    assert "left_wrist: body 'left_wrist' is tracked in 100 %" in said
-    assert "right_wrist: no body 'right_wrist' arrives" in said
-    assert "'rightwrist'" in said
+    output = capsys.readouterr().out
+    assert "left_wrist: body 'left_wrist' is tracked in 100 %" in output
+    assert "right_wrist: no body 'right_wrist' arrives" in output
+    assert "'rightwrist'" in output
 
 
 @pytest.mark.parametrize(
-    ("version", "says"),
-    [((3, 0), "answers but streams no frames"), ((2, 9), "speaks NatNet 2.9; 3.0")],
+    ("version", "expected"),
+    [((3, 0), "answers but streams no frames"), ((2, 9), "speaks NatNet 2.9, and this program understands 3.0")],
 )
-def test_motive_that_answers(ports, capsys, version, says):
+def test_motive_that_answers(ports, capsys, version, expected):
     with FakeMotive(version, {1: "left_wrist"}) as motive:
         assert doctor.main([*ports, "--seconds=0.5", f"--natnet=127.0.0.1:{motive.port}"]) == 1
-    assert says in capsys.readouterr().out
+    assert expected in capsys.readouterr().out
 
 
 def test_motive_that_does_not_answer(ports, capsys):
@@ -212,7 +212,7 @@ def test_motive_that_does_not_answer(ports, capsys):
 
 
 @pytest.mark.parametrize(
-    ("counters", "bodies", "says"),
+    ("counters", "bodies", "expected"),
     [
         ({}, {}, "nothing arrives at all"),
         (
@@ -226,7 +226,7 @@ def test_motive_that_does_not_answer(ports, capsys):
         ({"frames_in": {"osc": 5}}, {"Box": {"state": "live"}}, "frames that arrived: 5 by osc"),
     ],
 )
-def test_a_running_server_is_asked(ports, capsys, monkeypatch, counters, bodies, says):
+def test_a_running_server_is_asked(ports, capsys, monkeypatch, counters, bodies, expected):
     monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
     with zmq.Context() as context, context.socket(zmq.REP) as server:
         server.bind(f"tcp://127.0.0.1:{port(ports, '--control-port')}")
@@ -240,11 +240,11 @@ def test_a_running_server_is_asked(ports, capsys, monkeypatch, counters, bodies,
         thread.start()
         doctor.main([*ports, "--seconds=0"])
         thread.join()
-    assert says in capsys.readouterr().out
+    assert expected in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
-    ("state", "problem", "says"),
+    ("state", "problem", "expected"),
     [
         ("connecting", None, "Motive does not answer"),
         ("connected", None, "answers but streams no frames"),
@@ -253,10 +253,10 @@ def test_a_running_server_is_asked(ports, capsys, monkeypatch, counters, bodies,
         ("streaming", None, "Motive, NatNet 3.0 answers; it defines the rigid bodies 1 'Box'"),
     ],
 )
-def test_a_running_server_tells_of_motive(state, problem, says):
+def test_a_running_server_reports_about_motive(state, problem, expected):
     motive = {"state": state, "server": "Motive, NatNet 3.0", "bodies": {"1": "Box"}, "problem": problem}
     findings = of_server({"counters": {"frames_in": {"natnet": 1}}, "natnet": motive}, "here")
-    assert any(says in finding.text for finding in findings)
+    assert any(expected in finding.text for finding in findings)
     assert any(finding.level == "problem" for finding in findings) == (state != "streaming")
 
 

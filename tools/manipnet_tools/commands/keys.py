@@ -1,4 +1,4 @@
-"""`manipnet keys`: make and list the keys of a server that is not only on loopback."""
+"""`manipnet keys`: make and list the keys of a server that other machines can reach."""
 
 import argparse
 import sys
@@ -18,29 +18,31 @@ from manipnet.net.curve_keys import (
 )
 
 EPILOG = """examples:
-  manipnet keys make server          the server's own keys, once
-  manipnet keys make stage-pc        a client: carry stage-pc.toml to that machine, then delete it here
-  manipnet keys list                 who may connect
-To keep a client out from now on, delete its line in clients.allow."""
+  manipnet keys make server          make the server's own keys, once
+  manipnet keys make stage-pc        make a client's keys; move stage-pc.toml to that machine
+  manipnet keys list                 list the clients that may connect
+To revoke a client's keys, delete its line in clients.allow."""
 
 
 def default_folder() -> Path:
-    """Where a user's keys are kept."""
+    """The folder of a user's keys."""
     return user_config_path("manipnet", appauthor=False) / "keys"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Do what the arguments say; the exit status."""
+    """Do what the arguments say. Returns the exit status."""
     parser = argparse.ArgumentParser(
         prog="manipnet keys",
-        description="Make and list the keys that let clients in over the network.",
+        description="Make and list the keys with which clients may connect over the network.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--folder", type=Path, default=default_folder(), help="where the keys are (%(default)s)")
+    parser.add_argument(
+        "--folder", type=Path, default=default_folder(), help="folder of the keys (default: %(default)s)"
+    )
     verbs = parser.add_subparsers(dest="verb", required=True)
     make = verbs.add_parser("make", help="make the keys of the server or of a client")
-    make.add_argument("name", help="'server', or the name of a client")
+    make.add_argument("name", help="'server', or a name for the client")
     verbs.add_parser("list", help="show the server's public key and the clients that may connect")
     options = parser.parse_args(argv)
     try:
@@ -55,9 +57,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _make(folder: Path, name: str) -> list[str]:
     if name == "server":
         keys = make_server_keys(folder)
-        return [f"made {folder / SERVER_FILE} (keep it secret)", f"public key: {keys.pair.public}"]
+        return [f"made {folder / SERVER_FILE} (secret; keep it here)", f"public key: {keys.pair.public}"]
     path = make_client_keys(folder, name)
-    return [f"made {path} (secret: carry it to {name}, then delete it here)", f"listed in {folder / ALLOW_FILE}"]
+    return [f"made {path} (secret; move it to {name})", f"added {name} to {folder / ALLOW_FILE}"]
 
 
 def _list(folder: Path) -> list[str]:

@@ -1,7 +1,7 @@
-"""NatNet frames and model definitions, versions 3.0 to 4.5: pure functions on bytes.
+"""Reads NatNet frames and model definitions of the versions 3.0 to 4.5, as pure functions on bytes.
 
-What is not needed for rigid bodies (markers, skeletons, assets, force plates, devices) is stepped over: from 4.1 on
-by the byte size that follows every count, before by the layout. Every reader raises `MessageError` only.
+What rigid bodies do not need (markers, skeletons, assets, force plates, devices) is skipped: from 4.1 on by the byte
+size that follows each count, and before by its layout. The readers raise `MessageError` and nothing else.
 """
 
 import struct
@@ -13,7 +13,7 @@ from manipnet.wire.bodies import MAX_BODIES, MAX_TIME_S, MessageError
 
 _SIZED: Version = (4, 1)
 _MAX_PARTS = 1_024
-"""Parts of variable length that one packet may have; more is an attack on our time."""
+"""Parts of variable length that one packet may have, so that no packet takes long to read."""
 _BODY = struct.Struct("<i3f4ffh")
 _SUFFIX_3 = struct.Struct("<IId3QH")
 _SUFFIX_4 = struct.Struct("<IId3Q2IH")
@@ -22,7 +22,7 @@ _VECTOR, _LABELLED_MARKER, _CAMERA_POSE = 12, 26, 28
 
 @dataclass(frozen=True, slots=True)
 class RigidBody:
-    """One body as streamed: `p` in the server's units and axes, `q` xyzw as sent."""
+    """One body as it was streamed: `p` in the server's units and axes, and `q` xyzw, not normalised."""
 
     id: int
     p: tuple[float, float, float]
@@ -33,7 +33,7 @@ class RigidBody:
 
 @dataclass(frozen=True, slots=True)
 class MocapFrame:
-    """One frame: its rigid bodies, `timestamp_s` since the server started, and stamps in its clock's ticks."""
+    """One frame: its rigid bodies, `timestamp_s` since the server started, and time stamps in ticks of its clock."""
 
     number: int
     bodies: tuple[RigidBody, ...]
@@ -47,23 +47,23 @@ class MocapFrame:
 
 
 def read_frame(payload: bytes, version: Version) -> MocapFrame:
-    """The payload of a frame packet in the given version."""
+    """Read the payload of a frame packet of the given version."""
     cursor = _Cursor(payload)
     sized = version >= _SIZED
     number = cursor.int32()
-    _step_over(cursor, sized, _marker_set)
-    _step_over(cursor, sized, lambda c: c.skip(_VECTOR))  # other markers
+    _skip_elements(cursor, sized, _marker_set)
+    _skip_elements(cursor, sized, lambda c: c.skip(_VECTOR))  # other markers
     bodies = _read_bodies(cursor, sized)
-    _step_over(cursor, sized, _skeleton)
+    _skip_elements(cursor, sized, _skeleton)
     if sized:
-        _step_over(cursor, sized, _nothing)  # assets, new in 4.1
-    _step_over(cursor, sized, lambda c: c.skip(_LABELLED_MARKER))
-    _step_over(cursor, sized, _analog)  # force plates
-    _step_over(cursor, sized, _analog)  # devices
+        _skip_elements(cursor, sized, _nothing)  # assets, new in 4.1
+    _skip_elements(cursor, sized, lambda c: c.skip(_LABELLED_MARKER))
+    _skip_elements(cursor, sized, _analog)  # force plates
+    _skip_elements(cursor, sized, _analog)  # devices
     suffix = cursor.unpack(_SUFFIX_4 if version >= (4, 0) else _SUFFIX_3)
     timestamp_s, flags = suffix[2], suffix[-1]
     if not abs(timestamp_s) <= MAX_TIME_S:
-        raise MessageError(f"NatNet frame {number} has the time {timestamp_s}; finite seconds are expected")
+        raise MessageError(f"NatNet frame {number} has the time {timestamp_s}; it must be finite, in seconds")
     return MocapFrame(
         number,
         bodies,
@@ -76,7 +76,7 @@ def read_frame(payload: bytes, version: Version) -> MocapFrame:
 
 
 def read_body_names(payload: bytes, version: Version) -> dict[int, str]:
-    """The payload of model definitions: the names of the rigid bodies by streaming id."""
+    """Read the payload of model definitions: the names of the rigid bodies by streaming id."""
     cursor = _Cursor(payload)
     names: dict[int, str] = {}
     for _ in range(cursor.count()):
@@ -89,12 +89,12 @@ def read_body_names(payload: bytes, version: Version) -> dict[int, str]:
         elif kind in _DEFINITIONS:
             _DEFINITIONS[kind](cursor, version, names)
         else:
-            break  # of unknown length: what follows cannot be found
+            break  # its length is unknown, so what follows cannot be found
     return names
 
 
 class _Cursor:
-    """A place in one payload that cannot leave it, and that tires of too many parts."""
+    """A position in one payload. It stays within the payload and limits the number of parts."""
 
     def __init__(self, payload: bytes) -> None:
         self._data = payload
@@ -103,13 +103,13 @@ class _Cursor:
 
     def skip(self, size: int) -> None:
         if size > self.left():
-            raise MessageError(f"NatNet payload ends at byte {len(self._data)}, {size} more are needed")
+            raise MessageError(f"a NatNet payload ends at byte {len(self._data)}, where {size} more are needed")
         self._offset += size
 
     def part(self) -> None:
         self._parts += 1
         if self._parts > _MAX_PARTS:
-            raise MessageError(f"NatNet payload has more than {_MAX_PARTS} parts")
+            raise MessageError(f"a NatNet payload has more than {_MAX_PARTS} parts")
 
     def unpack(self, layout: struct.Struct) -> tuple:
         start = self._offset
@@ -124,14 +124,14 @@ class _Cursor:
     def count(self) -> int:
         count = self.int32()
         if not 0 <= count <= len(self._data):
-            raise MessageError(f"NatNet payload of {len(self._data)} bytes announces {count} elements")
+            raise MessageError(f"a NatNet payload of {len(self._data)} bytes announces {count} elements")
         return count
 
     def text(self) -> bytes:
         start = self._offset
         end = self._data.find(b"\0", start)
         if end < 0:
-            raise MessageError(f"NatNet text at byte {start} has no end")
+            raise MessageError(f"a NatNet text at byte {start} has no end")
         self._offset = end + 1
         return self._data[start:end]
 
@@ -139,16 +139,16 @@ class _Cursor:
         return len(self._data) - self._offset
 
     def section(self) -> "_Cursor":
-        """A cursor over the section whose byte size comes next; this one goes behind the section."""
+        """A cursor over the section whose byte size comes next. This cursor moves behind the section."""
         size = self.int32()
         if not 0 <= size <= self.left():
-            raise MessageError(f"NatNet section announces {size} bytes, {self.left()} are left")
+            raise MessageError(f"a NatNet section announces {size} bytes, but {self.left()} are left")
         start = self._offset
         self.skip(size)
         return _Cursor(self._data[start : start + size])
 
 
-def _step_over(cursor: _Cursor, sized: bool, element: Callable[[_Cursor], None]) -> None:
+def _skip_elements(cursor: _Cursor, sized: bool, element: Callable[[_Cursor], None]) -> None:
     count = cursor.count()
     if sized:
         cursor.section()
@@ -161,13 +161,13 @@ def _step_over(cursor: _Cursor, sized: bool, element: Callable[[_Cursor], None])
 def _read_bodies(cursor: _Cursor, sized: bool) -> tuple[RigidBody, ...]:
     count = cursor.count()
     if count > MAX_BODIES:
-        raise MessageError(f"NatNet frame has {count} rigid bodies; at most {MAX_BODIES} are allowed")
+        raise MessageError(f"a NatNet frame has {count} rigid bodies; at most {MAX_BODIES} are allowed")
     extra = 0
-    if sized:  # a newer version may add to each body: the byte size tells how much
+    if sized:  # a newer version may add fields to each body; the byte size tells how many bytes
         cursor = cursor.section()
         extra = cursor.left() // count - _BODY.size if count else 0
         if extra < 0:
-            raise MessageError(f"NatNet section of {cursor.left()} bytes announces {count} rigid bodies")
+            raise MessageError(f"a NatNet section of {cursor.left()} bytes announces {count} rigid bodies")
     bodies = []
     for _ in range(count):
         id, px, py, pz, qx, qy, qz, qw, mean_error, params = cursor.unpack(_BODY)
@@ -265,4 +265,4 @@ _DEFINITIONS = dict(
         ]
     )
 )
-"""Readers of one definition by kind, for the versions without byte sizes."""
+"""The reader of each kind of definition, for the versions without byte sizes."""

@@ -1,7 +1,7 @@
-"""NatNet packets of OptiTrack Motive: message ids, handshake, clock echo, as pure functions on bytes.
+"""Reads and writes NatNet packets of OptiTrack Motive (handshake and clock echo), as pure functions on bytes.
 
-A packet is a message id and a payload size (uint16 each), then the payload; all little-endian. Frames and model
-definitions are read by `natnet_frames`. Every reader raises `MessageError` and nothing else.
+A packet consists of a message id and a payload size (uint16 each), then the payload, all little-endian. The module
+`frames` reads frames and model definitions. The readers raise `MessageError` and nothing else.
 """
 
 import struct
@@ -40,7 +40,7 @@ class MessageId(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ServerInfo:
-    """The server's answer to a connect packet. `clock_hz` is the rate of its tick stamps, zero if it tells none."""
+    """The server's answer to a connect packet. `clock_hz` is the rate of its time stamps, zero if it has none."""
 
     application: str
     application_version: tuple[int, int, int, int]
@@ -51,12 +51,12 @@ class ServerInfo:
 
 
 def read_packet(packet: bytes) -> tuple[int, bytes]:
-    """Message id and payload."""
+    """The message id and the payload of a packet."""
     if len(packet) < 4:
-        raise MessageError(f"NatNet packet has {len(packet)} bytes; at least 4 are needed")
+        raise MessageError(f"a NatNet packet has {len(packet)} bytes; at least 4 are needed")
     message_id, size = struct.unpack_from("<HH", packet)
     if size > len(packet) - 4:
-        raise MessageError(f"NatNet packet announces {size} bytes of payload and has {len(packet) - 4}")
+        raise MessageError(f"a NatNet packet announces a payload of {size} bytes, but has {len(packet) - 4}")
     return message_id, packet[4 : 4 + size]
 
 
@@ -66,21 +66,21 @@ def write_packet(message_id: MessageId, payload: bytes = b"") -> bytes:
 
 
 def connect_payload(application: str) -> bytes:
-    """The payload of a connect packet: who we are, no version asked for (the server then uses its own)."""
+    """The payload of a connect packet: our name, and no version, so that the server uses its own."""
     return _SENDER.pack(application.encode("ascii"), 0, 0, 0, 0, *NEWEST, 0, 0)
 
 
 def read_server_info(payload: bytes) -> ServerInfo:
-    """The payload of `SERVER_INFO`."""
+    """Read the payload of `SERVER_INFO`."""
     if len(payload) < _SENDER.size:
-        raise MessageError(f"server info has {len(payload)} bytes; at least {_SENDER.size} are needed")
+        raise MessageError(f"the server info has {len(payload)} bytes; at least {_SENDER.size} are needed")
     name, *versions = _SENDER.unpack_from(payload)
     tail = payload[_SENDER.size :]
-    if len(tail) < _SERVER.size:  # a bridge that poses as Motive may leave out what follows the versions
+    if len(tail) < _SERVER.size:  # a bridge that imitates Motive may omit what follows the versions
         tail = _SERVER.pack(0, DATA_PORT, 0, 0, 0, 0, 0)
     clock_hz, data_port, is_multicast, *group = _SERVER.unpack_from(tail)
     if clock_hz >= 10**12 or not data_port:
-        raise MessageError(f"server info names a clock of {clock_hz} Hz and data port {data_port}")
+        raise MessageError(f"the server info names a clock of {clock_hz} Hz and the data port {data_port}")
     return ServerInfo(
         application=printable(name.partition(b"\0")[0]) or "unknown",
         application_version=(versions[0], versions[1], versions[2], versions[3]),
@@ -92,22 +92,22 @@ def read_server_info(payload: bytes) -> ServerInfo:
 
 
 def check_version(version: Version) -> None:
-    """Raises `MessageError` for a version whose frames cannot be read, with the remedy."""
+    """Raise `MessageError`, which names the remedy, for a version whose frames cannot be read."""
     if not OLDEST <= version < (NEWEST[0] + 1, 0):
         raise MessageError(
-            f"server speaks NatNet {version[0]}.{version[1]}; {OLDEST[0]}.{OLDEST[1]} (Motive 2.0) to "
-            f"{NEWEST[0]}.{NEWEST[1]} are understood: update Motive, or this program"
+            f"the server speaks NatNet {version[0]}.{version[1]}, and this program understands "
+            f"{OLDEST[0]}.{OLDEST[1]} (Motive 2.0) to {NEWEST[0]}.{NEWEST[1]}; update Motive, or this program"
         )
 
 
 def read_echo(payload: bytes) -> tuple[int, int]:
-    """`ECHO_RESPONSE`: the stamp we sent, and the server's clock in ticks when it had it."""
+    """Read `ECHO_RESPONSE`: the time stamp we sent, and the server's clock, in ticks, when it received it."""
     if len(payload) < 16:
-        raise MessageError(f"echo response has {len(payload)} bytes; 16 are needed")
+        raise MessageError(f"the echo response has {len(payload)} bytes; 16 are needed")
     return struct.unpack_from("<QQ", payload)
 
 
 def printable(text: bytes) -> str | None:
-    """A name in a packet as text that can be logged and matched; None when it is empty or not text."""
+    """A name in a packet, or None if it is empty, too long or not printable, and so cannot be logged or matched."""
     name = text.decode("utf-8", errors="replace")
     return name if 0 < len(name) <= MAX_NAME_CHARS and name.isprintable() else None

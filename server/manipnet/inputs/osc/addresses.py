@@ -1,6 +1,6 @@
-"""What an OSC message means: the addresses in the wild, looked up exactly.
+"""The meaning of OSC messages: the addresses that senders use, matched exactly.
 
-`<body>` is a number (then it is an id) or a name. `docs/protocol-in.md` has the table with examples.
+`<body>` is a streaming id if it is a number, and a name otherwise. `docs/protocol-in.md` has a table with examples.
     /rigidbody/<body>/{position, quat, tracked, transformation}     NatNet bridges
     /rigidbody <body> {position, quat, tracked, transformation} …   the same, body and field as arguments
     /frame/start n, /frame/timestamp ms, /frame/end n               NatNet bridges
@@ -23,7 +23,7 @@ _FLOATS = {float}
 
 
 class Route(NamedTuple):
-    """What a message says: a field of a body, or of the frame (`start`, `end`, `timestamp`)."""
+    """The content of a message: a field of a body, or of the frame (`start`, `end`, `timestamp`)."""
 
     body: BodyKey
     field: str
@@ -31,7 +31,7 @@ class Route(NamedTuple):
 
 
 def read_route(message: bytes) -> Route | None:
-    """The meaning of one OSC message, None when it is not for us; raises `MessageError`."""
+    """The content of one OSC message, or None if its address is not one of these. Raises `MessageError`."""
     raw, offset = read_address(message)
     place = _look_up(raw)
     arguments = read_arguments(message, offset)
@@ -45,7 +45,7 @@ def read_route(message: bytes) -> Route | None:
         body, count, arguments = _body_key(arguments[0], raw), _FIELD_SIZES[name], arguments[2:]
     elif kind == "device":
         if not arguments:
-            raise MessageError(f"{raw.decode()} has no arguments; a serial and 7 numbers are expected")
+            raise MessageError(f"{raw.decode()} has no arguments; it must have a serial number and 7 numbers")
         body, arguments = _body_key(arguments[0], raw), arguments[1:]
     values = _numbers(arguments, count, raw)
     if kind == "device":
@@ -55,13 +55,13 @@ def read_route(message: bytes) -> Route | None:
     elif kind == "tracker":
         name, values = "quat", unity_euler_to_quat(*values)
     elif kind == "frame" and not abs(values[0]) <= 1e3 * MAX_TIME_S:
-        raise MessageError(f"{raw.decode()} is {values[0]}; it must be finite, at most {1e3 * MAX_TIME_S:g}")
+        raise MessageError(f"{raw.decode()} is {values[0]}; it must be finite and at most {1e3 * MAX_TIME_S:g}")
     return Route(body, name, values)
 
 
 @lru_cache(maxsize=1024)
 def _look_up(raw: bytes) -> tuple[str, BodyKey, str, int] | None:
-    """`(kind, body, field, how many numbers)` of an exact address; None for one that is not ours."""
+    """`(kind, body, field, count of numbers)` of an address, or None for any other address."""
     match check_address(raw).split("/")[1:]:
         case ["rigidbody", body, str(name)] if name in _FIELD_SIZES:
             return "body", _body_key(body, raw), name, _FIELD_SIZES[name]
@@ -79,7 +79,7 @@ def _look_up(raw: bytes) -> tuple[str, BodyKey, str, int] | None:
 
 
 def _body_key(text: Argument, raw_address: bytes) -> BodyKey:
-    """A body's id when it is written in digits, else its name."""
+    """The id of a body that is written in digits, or else its name."""
     if isinstance(text, str):
         if not (text.isascii() and text.isdigit()):
             return check_name(text, f"body in {raw_address.decode()}")
@@ -96,21 +96,21 @@ def _numbers(arguments: tuple[Argument, ...], count: int, raw_address: bytes) ->
         return arguments  # type: ignore[return-value]
     values = tuple(float(value) for value in arguments if isinstance(value, int | float))
     if not len(values) == len(arguments) == count:
-        raise MessageError(f"{raw_address.decode()} has {len(arguments)} arguments; {count} numbers are expected")
+        raise MessageError(f"{raw_address.decode()} has {len(arguments)} arguments; it must have {count} numbers")
     return values
 
 
 def _from_unity(pose: Numbers) -> Numbers:
-    """A pose in Unity's left-handed frame to ours: mirrored through x = 0."""
+    """Convert a pose from Unity's left-handed frame to the project frame by mirroring it through x = 0."""
     x, y, z, qx, qy, qz, qw = pose
     return (-x, y, z, qx, -qy, -qz, qw)
 
 
 def unity_euler_to_quat(x_deg: float, y_deg: float, z_deg: float) -> Numbers:
-    """Unity's Euler angles to a quaternion of ours.
+    """Convert Unity's Euler angles to a quaternion in the project frame.
 
-    Unity turns about z, then x, then y, each about the fixed axes (its manual on `Transform.eulerAngles`, and
-    VRChat's page on OSC trackers refers to Unity's system), so q = q_y q_x q_z, then mirrored through x = 0.
+    Unity rotates about z, then x, then y, each about a fixed axis, so q = q_y q_x q_z, which is then mirrored through
+    x = 0. Sources: Unity's manual on `Transform.eulerAngles`; VRChat's page on OSC trackers, which uses Unity's system.
     """
     if not all(map(math.isfinite, (x_deg, y_deg, z_deg))):
         return (math.nan,) * 4

@@ -1,4 +1,4 @@
-"""Which OSC messages belong to one instant: the messages of one sender gathered into frames."""
+"""Assembles the OSC messages of one sender into frames, each of which holds the messages of one instant."""
 
 from dataclasses import dataclass, field
 
@@ -7,18 +7,18 @@ from manipnet.inputs.osc.packet import IMMEDIATELY, time_tag_to_s
 from manipnet.wire.bodies import MAX_BODIES, BodyFrame, BodySample, make_sample
 
 GAP_S = 0.005
-"""Loose messages farther apart than this belong to different frames."""
+"""Unmarked messages that arrive farther apart than this belong to different frames."""
 MARKED_GAP_S = 0.050
-"""A frame that was started but never ended is given up waiting for after this long."""
+"""Timeout for a frame that was started but not ended."""
 CLOCK_PATIENCE = 60
-"""Frames without their usual time stamp before a sender is believed to send none any more."""
+"""After this many frames without a time stamp, a sender counts as one that sends none."""
 
 _ARRIVAL, _STAMP, _TAG = range(3)
 
 
 @dataclass(slots=True)
 class _Pending:
-    """The frame that is being gathered: what is known of each body, and of the instant."""
+    """The frame that is being assembled: the fields of each body, and its times."""
 
     bodies: dict[BodyKey, dict[str, Numbers]] = field(default_factory=dict)
     number: int | None = None
@@ -30,12 +30,12 @@ class _Pending:
 
 
 class FrameAssembler:
-    """Gathers the messages of one sender into frames. Pure: arrival times are arguments.
+    """Assembles the messages of one sender into frames. Reads no clock: arrival times are arguments.
 
-    A frame ends with `/frame/end`, with the bundle it came in, with a second value for what it already has,
-    or with a gap; `/frame/start` … `/frame/end` holds it together across datagrams and bundles. Its time is
-    the bundle's time tag, else `/frame/timestamp`, else its arrival. Once a sender gave times, a frame that
-    lost its own is not mixed in with arrival times but left out, and counted in `incomplete`.
+    A frame ends with `/frame/end`, at the end of its bundle, with a second value for a field that it already has, or
+    after a gap. Between `/frame/start` and `/frame/end` it may extend over several datagrams and bundles. Its time is
+    the time tag of its bundle, or else `/frame/timestamp`, or else its arrival. Once a sender has given times, a frame
+    without one is dropped and counted in `incomplete`, since its arrival time would not fit between the others.
     """
 
     def __init__(self, source: str) -> None:
@@ -47,26 +47,26 @@ class FrameAssembler:
 
     @property
     def pending(self) -> bool:
-        """Whether `flush` has anything to wait for."""
+        """Whether a frame is being assembled."""
         return bool(self._pending.bodies)
 
     def add(self, messages: list[tuple[int, bytes]], t_received_s: float) -> tuple[list[BodyFrame], bool]:
-        """Frames that one datagram's messages completed, and whether any message was for us.
+        """The frames that one datagram completes, and whether any of its messages has a known address.
 
-        `messages` is the answer of `split_packet`. Raises `MessageError` for a wrong message, and then takes
-        none of the datagram's.
+        `messages` is what `split_packet` returned. Raises `MessageError` for a wrong message, and then ignores the
+        whole datagram.
         """
         routes = [(tag, route) for tag, message in messages if (route := read_route(message)) is not None]
         frames = self.flush(t_received_s)
         for time_tag, route in routes:
             self._take(route, time_tag, t_received_s, frames)
-        # Some senders wrap each message in a bundle of its own: only a bundle of several ends a frame.
+        # Some senders wrap each message in a bundle of its own, so only a bundle of several messages ends a frame.
         if len(routes) > 1 and not self._pending.marked:
             self._close(frames)
         return frames, bool(routes)
 
     def flush(self, now_s: float) -> list[BodyFrame]:
-        """The frame that is over because nothing more came for a while, if there is one."""
+        """The frame that is complete because nothing has arrived for a while, if there is one."""
         frames: list[BodyFrame] = []
         patience_s = MARKED_GAP_S if self._pending.marked else GAP_S
         if self.pending and now_s - self._pending.touched_s > patience_s:
@@ -74,7 +74,7 @@ class FrameAssembler:
         return frames
 
     def _take(self, route: Route, time_tag: int, t_received_s: float, frames: list[BodyFrame]) -> None:
-        if self._begins_anew(route, time_tag):
+        if self._begins_next_frame(route, time_tag):
             self._close(frames)
         pending = self._pending
         pending.touched_s = t_received_s
@@ -94,10 +94,10 @@ class FrameAssembler:
             case _:
                 self.incomplete += 1
 
-    def _begins_anew(self, route: Route, time_tag: int) -> bool:
-        """Whether a message cannot belong to the frame that is being gathered."""
+    def _begins_next_frame(self, route: Route, time_tag: int) -> bool:
+        """Whether a message cannot belong to the frame that is being assembled."""
         pending = self._pending
-        if route.field == "start":  # a doubled datagram repeats the start of the frame that is open
+        if route.field == "start":  # a datagram that arrives twice repeats the start of the open frame
             return not (pending.marked and pending.number == int(route.values[0]))
         if pending.marked:
             return False
@@ -133,10 +133,10 @@ class FrameAssembler:
 
 
 def _sample(key: BodyKey, fields: dict[str, Numbers]) -> BodySample | None:
-    """The body of what was gathered; None when a part of its pose is missing."""
+    """The body with the given fields, or None if a part of its pose is missing."""
     id, name = (key, None) if isinstance(key, int) else (None, key)
     tracked = fields.get("tracked", (1.0,))[0] != 0.0
-    pose = fields.get("local") or fields.get("transformation")  # VMC: "local" is the unscaled one of the two
+    pose = fields.get("local") or fields.get("transformation")  # of the two in VMC, "local" is not scaled
     if pose is None and "position" in fields and "quat" in fields:
         pose = fields["position"] + fields["quat"]
     if pose is None:

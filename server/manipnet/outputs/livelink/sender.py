@@ -1,7 +1,7 @@
-"""Fingers out as Epic's JSON Live Link format: for its sample receiver, which listens on UDP port 54321.
+"""Sends hands in Epic's JSON Live Link format, for its sample receiver, which listens on UDP port 54321.
 
-One datagram per hand: `{"<subject>": [{"Name", "Parent", "Location", "Rotation", "Scale"}, …]}`. Bones are the OpenXR
-joints hanging on the wrist, relative to their parent, in Unreal's axes and centimetres.
+There is one datagram for each hand: `{"<subject>": [{"Name", "Parent", "Location", "Rotation", "Scale"}, …]}`. The
+bones are the OpenXR joints below the wrist, relative to their parents, in Unreal's axes and centimetres.
 """
 
 import json
@@ -16,11 +16,11 @@ from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 from manipnet.wire import Side
 
 ORDER = (1, 0, *range(2, 26))
-"""Wrist first: Live Link wants parents before children."""
+"""The wrist comes first, since Live Link expects parents before children."""
 
 
 class LiveLinkJsonSender(HandsOutput):
-    """Sends every message's hands to one receiver, as subjects "ManipNet_<actor>_<side>". Not thread-safe."""
+    """Sends the hands of each message to one receiver, as the subjects "ManipNet_<actor>_<side>"."""
 
     def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)
@@ -39,7 +39,7 @@ class LiveLinkJsonSender(HandsOutput):
 
 
 def hand_json(actor: str, side: Side, joints: Array) -> bytes:
-    """The datagram of one hand from its world `joints (26, 7)`."""
+    """The datagram of one hand, from the world poses of its `joints (26, 7)`."""
     local = joints.copy()
     children = list(ORDER[1:])
     parents = [OPENXR_PARENTS[joint] for joint in children]

@@ -59,7 +59,7 @@ class WebSocketPublisher(HandsOutput):
         """Offer one payload to every client and return at once; False if there is none. From any thread."""
         if not self._clients:
             return False
-        with contextlib.suppress(RuntimeError):  # the loop is closed: the server is stopping
+        with contextlib.suppress(RuntimeError):  # the loop is closed, since the server is stopping
             self._loop.call_soon_threadsafe(self._offer, payload)
         return True
 
