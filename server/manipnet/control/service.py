@@ -1,8 +1,8 @@
 """Requests from clients: a ROUTER socket, which REQ sockets connect to, on a thread of its own."""
 
-import logging
 import threading
 import time
+from collections.abc import Callable
 from typing import Final
 
 import zmq
@@ -12,6 +12,7 @@ from manipnet.net.addresses import is_loopback
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import Throttle
+from manipnet.net.supervised import ReceiverHealth, SupervisedThread
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.telemetry import Telemetry
 
@@ -20,7 +21,6 @@ REQUESTS_PER_S: Final = 200
 BURST: Final = 50
 """Totals over all clients; above them, replies are delayed to protect tick time."""
 _ANSWERS: Final = "inproc://answers"
-_log = logging.getLogger(__name__)
 
 
 class Control:
@@ -34,18 +34,14 @@ class Control:
         Raises `ListenError`.
         """
         self._dispatcher, self._throttle = dispatcher, Throttle(REQUESTS_PER_S, BURST)
+        self._host, self._telemetry, self._keys = host, telemetry, keys
         try:
-            self._bound = BoundSocket(zmq.ROUTER, host, port, telemetry, keys, MAX_REQUEST_BYTES)
+            self._door = self._open(port)
         except ListenError as error:
             raise ListenError(f"--control-port: {error}") from None
-        self.address = self._bound.address
-        self._answers = self._bound.context.socket(zmq.PULL)
-        self._answers.bind(_ANSWERS)
-        self._to_answers = self._bound.context.socket(zmq.PUSH)
-        self._to_answers.setsockopt(zmq.LINGER, 0)
-        self._to_answers.connect(_ANSWERS)
-        self._answering = threading.Lock()
-        self._thread = threading.Thread(target=self._run, name="control", daemon=True)
+        self.address = self._door.bound.address
+        self._health = ReceiverHealth("control", telemetry)
+        self._thread = SupervisedThread("control", self._health, self._run, self._reopen)
 
     def start(self) -> None:
         """Begin to answer."""
@@ -53,49 +49,88 @@ class Control:
 
     def stop(self) -> None:
         """Stop answering and free the port."""
-        with self._answering:
-            self._to_answers.close()
+        self._thread.stopping.set()
+        self._door.stop_replies()
         if self._thread.is_alive():
-            self._bound.interrupt()
+            self._door.bound.interrupt()
             self._thread.join()
-        else:
-            self._answers.close()
-            self._bound.close()
+        self._door.close()
 
     def connected(self) -> int:
         """The number of connected clients. From any thread."""
-        return self._bound.connected()
+        return self._door.bound.connected()
+
+    def _open(self, port: int) -> "_Door":
+        return _Door(BoundSocket(zmq.ROUTER, self._host, port, self._telemetry, self._keys, MAX_REQUEST_BYTES))
+
+    def _reopen(self) -> None:
+        self._door.close()
+        self._door = self._open(int(self.address.rpartition(":")[2]))
 
     def _run(self) -> None:
-        poller = zmq.Poller()
-        with self._bound.socket as router, self._answers as answers:
+        """Answer until the context is terminated, which raises `zmq.ContextTerminated`."""
+        door, poller = self._door, zmq.Poller()
+        with door.bound.socket as router, door.answers as answers:
             poller.register(router, zmq.POLLIN)
             poller.register(answers, zmq.POLLIN)
             while True:
-                try:
-                    for ready, _ in poller.poll():
-                        if ready is answers:
-                            router.send_multipart(answers.recv_multipart())
-                        else:
-                            self._receive(router.recv_multipart(copy=False))
-                except zmq.ContextTerminated:
-                    return
-                except zmq.ZMQError as error:
-                    _log.warning("control: an answer was lost: %s", error)
+                for ready, _ in poller.poll():
+                    if ready is answers:
+                        answer = answers.recv_multipart()
+                        self._guarded(router.send_multipart, answer)
+                    else:
+                        request = router.recv_multipart(copy=False)
+                        self._guarded(self._receive, door, request)
 
-    def _receive(self, frames: list[zmq.Frame]) -> None:
+    def _guarded(self, action: Callable[..., object], *arguments: object) -> None:
+        """Handle one message; an error costs this message only."""
+        try:
+            action(*arguments)
+        except zmq.ContextTerminated:
+            raise
+        except Exception:
+            self._health.message_failed()
+
+    def _receive(self, door: "_Door", frames: list[zmq.Frame]) -> None:
         """One message: the client's identity, an empty frame, and the request."""
-        self._bound.delivered(frames[0])
+        door.bound.delivered(frames[0])
         time.sleep(self._throttle.delay_s(time.monotonic()))
         identity, *rest = frames
         if not rest or rest[0].bytes:  # not from a REQ socket, which alone could read an answer
             return
         envelope = [identity.bytes, b""]
-
-        def reply(answer: bytes) -> None:
-            with self._answering:
-                if not self._to_answers.closed:
-                    self._to_answers.send_multipart([*envelope, answer])
-
         here = is_loopback(str(identity.get("Peer-Address")))
-        self._dispatcher.submit([frame.bytes for frame in rest[1:]], reply, here)
+        self._dispatcher.submit(
+            [frame.bytes for frame in rest[1:]], lambda answer: door.reply([*envelope, answer]), here
+        )
+
+
+class _Door:
+    """The bound socket, and the way from the threads that meet requests to it, in the same context."""
+
+    def __init__(self, bound: BoundSocket) -> None:
+        self.bound = bound
+        self.answers: zmq.Socket = bound.context.socket(zmq.PULL)
+        self.answers.setsockopt(zmq.LINGER, 0)
+        self.answers.bind(_ANSWERS)
+        self._replies: zmq.Socket = bound.context.socket(zmq.PUSH)
+        self._replies.setsockopt(zmq.LINGER, 0)
+        self._replies.connect(_ANSWERS)
+        self._replying = threading.Lock()
+
+    def reply(self, message: list[bytes]) -> None:
+        """Let the thread of the bound socket send an answer. From any thread; does nothing after `stop_replies`."""
+        with self._replying:
+            if not self._replies.closed:
+                self._replies.send_multipart(message)
+
+    def stop_replies(self) -> None:
+        """Close what `reply` uses, so that the context can end. From any thread."""
+        with self._replying:
+            self._replies.close()
+
+    def close(self) -> None:
+        """Close everything. Belongs to the thread that uses the bound socket, or comes after its end."""
+        self.stop_replies()
+        self.answers.close()
+        self.bound.close()
