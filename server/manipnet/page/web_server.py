@@ -17,6 +17,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from manipnet.net.addresses import is_loopback
+from manipnet.net.half_open import BACKLOG, HalfOpen
 from manipnet.page import policy
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
@@ -24,6 +25,8 @@ OPERATOR: Final = ContextVar("OPERATOR", default=False)
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
 """What the page adds to viser's own: a title, and files that are dropped on it."""
 DROP_PATH: Final = "/drop"
+OPEN_S: Final = 10.0
+"""A visitor that has not sent a whole request after this time is cut off."""
 _POLICY_VIOLATION: Final = 1008
 
 Dropped = Callable[[str, bytes], str]
@@ -74,7 +77,15 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
                 policy.protect(response, SCRIPT)
             return response
 
-        return original(handle, sock=listener, process_request=answer, **options)
+        return original(
+            handle,
+            sock=listener,
+            process_request=answer,
+            create_connection=HalfOpen().connection,
+            open_timeout=OPEN_S,
+            backlog=BACKLOG,
+            **options,
+        )
 
     websockets.asyncio.server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
     try:
