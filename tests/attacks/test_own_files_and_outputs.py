@@ -7,14 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from live_server import FREE_PORTS, PATIENCE_S, START_S
+from live_server import PATIENCE_S, START_S, free_ports
 
 OPTIONS = ("--mesh", "日本=cube")
 
 
 def start(folder: Path, tiny_bundle: Path, **environment: str) -> subprocess.Popen[bytes]:
     """A server on free ports whose output is read as bytes."""
-    command = [sys.executable, "-m", "manipnet.cli", *FREE_PORTS, "--model", str(tiny_bundle), *OPTIONS]
+    command = [sys.executable, "-m", "manipnet.cli", *free_ports(), "--model", str(tiny_bundle), *OPTIONS]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, **environment}, cwd=folder
     )
