@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 from live_server import PATIENCE_S, START_S, free_ports
 
-OPTIONS = ("--mesh", "日本=cube")
+OPTIONS = ("--mesh", "日本=hammer")
+"""A prop that is not among those whose shapes come with the program."""
 
 
 def start(folder: Path, tiny_bundle: Path, **environment: str) -> subprocess.Popen[bytes]:
@@ -37,22 +38,21 @@ def wait_ready(server: subprocess.Popen[bytes]) -> None:
 def kernels(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cache that one start has filled."""
     folder = tmp_path_factory.mktemp("cache")
-    server = start(folder, tiny_bundle, MANIPNET_CACHE=str(folder))
-    wait_ready(server)
-    end(server)
+    for _ in range(2):
+        server = start(folder, tiny_bundle, MANIPNET_CACHE=str(folder))
+        wait_ready(server)
+        _, errors = end(server)
+    assert b"damaged" not in errors, "a start finds what the one before has left"
     return folder
 
 
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc", ".npz"])
-@pytest.mark.parametrize("kept", [0.0, 0.5])
-def test_a_cut_cache_is_rebuilt_and_reported(
-    kernels: Path, tiny_bundle: Path, tmp_path: Path, suffix: str, kept: float
-) -> None:
+def test_a_cut_cache_is_rebuilt_and_reported(kernels: Path, tiny_bundle: Path, tmp_path: Path, suffix: str) -> None:
     cache = tmp_path / "cache"
     shutil.copytree(kernels, cache)
     files = sorted(cache.rglob(f"*{suffix}"))
     assert files, f"the cache holds no {suffix}"
-    for file in files:
+    for file, kept in zip(files, (0.0, 0.5), strict=False):  # a few, since all of it takes long to compile
         content = file.read_bytes()
         file.write_bytes(content[: int(kept * len(content))])
     server = start(tmp_path, tiny_bundle, MANIPNET_CACHE=str(cache))

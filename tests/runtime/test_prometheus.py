@@ -36,7 +36,9 @@ def test_this_machine_may_read_the_counters(page, telemetry, host):
     assert 'manipnet_frames_dropped_total{reason="late"} 1.0' in text
 
 
-@pytest.mark.parametrize("host", ["evil.test", "127.0.0.1.evil.test", "127.0.0.1@evil.test", "localhost.evil.test", "["])
+@pytest.mark.parametrize(
+    "host", ["evil.test", "127.0.0.1.evil.test", "127.0.0.1@evil.test", "localhost.evil.test", "["]
+)
 def test_a_foreign_page_that_was_rebound_to_this_machine_may_not(page, host):
     assert get(page, host)[0] == 403
 
