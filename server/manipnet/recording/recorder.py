@@ -14,7 +14,9 @@ from manipnet.control.request import Handler, Request, RequestError
 from manipnet.recording.take import Take, TakeError
 from manipnet.telemetry import Telemetry
 
-NAME: Final = re.compile(r"[\w][\w .-]{0,63}")
+NAME: Final = re.compile(r"\w([\w .-]{0,62}[\w-])?")
+DEVICES: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)( *\..*)?", re.IGNORECASE)
+"""Names that stand for devices on Windows, whatever suffix they have."""
 
 About = Callable[[], tuple[dict[str, str], Sequence[Prop]]]
 """What a recording depends on: its metadata, and the props whose meshes it keeps."""
@@ -50,7 +52,12 @@ class Recorder:
     def _record(self, request: Request) -> dict[str, Any]:
         name = request.get("name", time.strftime("take %Y-%m-%d %H.%M.%S"))
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise RequestError(f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -")
+            raise RequestError(
+                f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
+                "not beginning or ending with a space or dot"
+            )
+        if DEVICES.fullmatch(name):
+            raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
         path = self._folder / (name.removesuffix(".mcap") + ".mcap")
         with self._lock:
             if (take := self._current()) is not None:
