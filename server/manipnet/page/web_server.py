@@ -17,13 +17,16 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from manipnet.net.addresses import is_loopback
-from manipnet.outputs.websocket.server import LOCAL_PAGES
+from manipnet.net.half_open import BACKLOG, HalfOpen
+from manipnet.page import policy
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
 """Whether the visitor may change anything: a browser on this machine that shows a page of this machine."""
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
 """What the page adds to viser's client: a title, and the import of files that are dropped on it."""
 DROP_PATH: Final = "/drop"
+OPEN_S: Final = 10.0
+"""A visitor that has not sent a whole request after this time is cut off."""
 _POLICY_VIOLATION: Final = 1008
 
 Dropped = Callable[[str, bytes], str]
@@ -65,12 +68,24 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             if not may_look(request.headers, exposed):
                 return connection.respond(HTTPStatus.FORBIDDEN, "This page is not for other web sites.\n")
+            if (reason := policy.refusal(request)) is not None:
+                return connection.respond(HTTPStatus.BAD_REQUEST, reason)
             with contextlib.suppress(KeyError):  # the script is inserted into the uncompressed page
                 del request.headers["Accept-Encoding"]
             response = process_request(connection, request)
-            return _with_script(response) if urlsplit(request.path).path == "/" else response
+            if response is not None and policy.is_page(response, request):
+                policy.protect(response, SCRIPT)
+            return response
 
-        return original(handle, sock=listener, process_request=answer, **options)
+        return original(
+            handle,
+            sock=listener,
+            process_request=answer,
+            create_connection=HalfOpen().connection,
+            open_timeout=OPEN_S,
+            backlog=BACKLOG,
+            **options,
+        )
 
     websockets.asyncio.server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
     try:
@@ -80,13 +95,11 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
 
 
 def may_look(headers: Any, exposed: bool) -> bool:
-    """Whether a request comes from a page of this machine, from no page at all or, where other machines are let in,
-    from the page itself: no other web site open in the same browser may."""
-    origin, host = headers.get("Origin"), headers.get("Host", "")
-    local = LOCAL_PAGES.fullmatch(f"http://{host}") is not None
-    if origin is None:
-        return local or exposed
-    return (local and LOCAL_PAGES.fullmatch(origin) is not None) or (exposed and origin == f"http://{host}")
+    """Whether a request comes from the page itself or from no page at all, through an address of this machine or, where
+    other machines are let in, through any: no other web site open in the same browser may look, also none of this
+    machine."""
+    host, origin = headers.get("Host", ""), headers.get("Origin")
+    return policy.is_own_page(headers) or (exposed and origin in (None, f"http://{host}"))
 
 
 def may_act(address: str, headers: Any) -> bool:
@@ -103,11 +116,3 @@ async def _take_in(connection: ServerConnection, request: Request, dropped: Drop
     with contextlib.suppress(ConnectionClosed):
         content = await connection.recv(decode=False)
         await connection.send(await asyncio.to_thread(dropped, name, content))
-
-
-def _with_script(response: Response | None) -> Response | None:
-    if response is not None and response.status_code == HTTPStatus.OK:
-        response.body = (response.body or b"").replace(b"</body>", f"<script>{SCRIPT}</script></body>".encode(), 1)
-        del response.headers["Content-Length"]
-        response.headers["Content-Length"] = str(len(response.body))
-    return response
