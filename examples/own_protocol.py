@@ -4,8 +4,8 @@
 
 Each datagram is one frame: a line with the time in seconds, then a line for each body with its name, position (metres)
 and quaternion, separated by spaces. The declaration at the end gives the protocol its flag, its key in rig files and
-its counters. To make it part of the server, put this file into server/manipnet/inputs/ and its declaration into
-`INPUTS` there; `manipnet doctor` and the tables of the documentation then know it too.
+its counters. To make it part of the server, put this file into server/manipnet/inputs/ and its declaration into the
+tuple `INPUTS` there; `manipnet doctor` and the tables of the documentation then know it too.
 """
 
 import sys

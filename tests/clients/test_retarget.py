@@ -20,8 +20,9 @@ def foreign_rig(side, rng, mirrored):
     """
     positions, _ = forward_kinematics(HAND, rng.uniform(-0.2, 0.3, 20))
     positions = 1.3 * positions
-    # the knuckles define the orientation of the hand
-    positions[[5, 8, 14]] = 1.3 * forward_kinematics(HAND, np.zeros(20))[0][[5, 8, 14]]
+    positions[[5, 8, 14]] = (
+        1.3 * forward_kinematics(HAND, np.zeros(20))[0][[5, 8, 14]]
+    )  # the knuckles define the hand's orientation
     if (side == "left") != mirrored:
         positions = positions * [-1, 1, 1]
     turn = quat_exp(rng.normal(size=3))

@@ -1,4 +1,4 @@
-"""Calibrating and placing without a server around: the requests, an actor that was shown the sheet, a rig file."""
+"""The requests calibrate and place_object without a server: on an actor whose hands were shown, and a rig file."""
 
 import threading
 from collections.abc import Iterator
@@ -71,8 +71,9 @@ def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(
     answer = calibrate({"op": "calibrate"})
     assert answer["stored"] == str(rig)
     for side in ("left", "right"):
-        part = f"{side}_wrist"
-        for offset in (actors_proxy.actors[0].offset(part), load_rig(rig).actors[0].wrists[part].offset):
+        role = f"{side}_wrist"
+        for offset in (actors_proxy.actors[0].offset(role), load_rig(rig).actors[0].wrists[role].offset):
+            assert offset is not None
             away_m, away_rad = difference(offset, CLUSTER)
             assert away_m < 1e-3
             assert away_rad < np.radians(0.5)

@@ -50,7 +50,7 @@ def test_a_slow_client_gets_the_newest(publisher):
             publisher.publish(i.to_bytes(4, "big") * 1000)
         seen = []
         while not seen or seen[-1] < 2999:
-            payload = connection.recv(timeout=10)
+            payload = connection.recv(timeout=10, decode=False)
             if payload != b"start":
                 seen.append(int.from_bytes(payload[:4], "big"))
     assert seen == sorted(set(seen))
@@ -103,6 +103,7 @@ def test_close_twice_and_publish_after():
     publisher.close()
     publisher.close()
     publisher.publish(b"nobody hears this")
+    assert publisher.address is not None
     host, port = publisher.address.removeprefix("ws://").split(":")
     with pytest.raises(OSError):
         socket.create_connection((host, int(port)), 5)

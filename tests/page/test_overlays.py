@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_server import scene
+from tracked_bodies import frame as body_frame
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
@@ -24,7 +25,6 @@ from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.telemetry import Telemetry
-from manipnet.wire.bodies import BodyFrame, BodySample
 
 HAND = shipped_hand()
 
@@ -59,8 +59,7 @@ def frames(prop: Prop, tiny_bundle: Path, tmp_path_factory: pytest.TempPathFacto
     rest = lambda message: None, mailbox, recorder, telemetry, observer
     loop = TickLoop("session", [actor], Synthesizer(bundle), *rest)
     for k in range(180):
-        bodies = (BodySample(None, str(n), tuple(p[:3]), tuple(p[3:]), True) for n, p in scene(k / 120).items() if p)
-        mailbox.put(BodyFrame(k / 120, k, tuple(bodies), k / 120, "zmq:test"))
+        mailbox.put(body_frame(k / 120, scene(k / 120), k))
         loop.take_in(0.0)
         while loop.step(k / 120):
             pass

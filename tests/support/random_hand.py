@@ -6,13 +6,13 @@ import numpy as np
 from make_vectors import messages
 from manipnet_client.retarget import BONES
 
-from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply
+from manipnet.geometry import Side, matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import HandsMessage
-from manipnet.wire.hands import Side
 
 HAND = shipped_hand()
+
 ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 """The joint at which each finger bone of `BONES` ends."""
 

@@ -23,6 +23,7 @@ from manipnet.synthesis.model.layout import PRESENT, layout_of
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer, windows_of
+from manipnet.wire import Side
 from manipnet_tools.bench.shapes import gourd
 
 HAND = shipped_hand()
@@ -64,11 +65,13 @@ def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
 
 def _in_world(hand: Hand, scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
     """What clients get of each hand, its size a little off."""
-    pairs = [
+    pairs: list[tuple[Side, ShownHand]] = [
         (scene.side, ShownHand("live", step.angles, scene.wrist[PRESENT], None))
         for scene, step in zip(scenes, steps, strict=True)
     ]
-    poses = [pose for part in (pairs[:2], pairs[2:]) for pose in hand_poses(hand, dict(part), 1.1).values()]
+    poses = list(hand_poses(HAND, dict(pairs[:2]), 1.1).values()) + list(
+        hand_poses(HAND, dict(pairs[2:]), 1.1).values()
+    )
     return {"joints": [pose.joints for pose in poses], "local_rotations": [pose.rotations for pose in poses]}
 
 

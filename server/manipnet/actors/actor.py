@@ -33,7 +33,8 @@ class Actor:
         self.seq = 0
         """Number of the next message."""
         self.paused = False
-        self.hand = bundle.hand
+        self.model_hand = bundle.hand
+        """The hand that is synthesised, of size 1."""
         limits = _limits(config, bundle)
         rest_angles = np.clip(bundle.rest_angles, *limits.T)
         self.hands: dict[Side, LiveHand] = {

@@ -28,7 +28,7 @@ def hands_message(
         t_capture=tick.time_s,
         t_publish=t_publish,
         look_ahead=tick.look_ahead_s,
-        hands=hand_poses(actor.hand, hands, actor.config.hand_scale),
+        hands=hand_poses(actor.model_hand, hands, actor.config.hand_scale),
         bodies=tuple(
             BodyPose(body.age_s <= HOLD_AFTER_S, body.pose, name) for name, body in sorted(tick.bodies.items())
         ),
@@ -38,22 +38,22 @@ def hands_message(
     return message
 
 
-def hand_poses(hand: Hand, hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, HandPose]:
-    """What is shown of the model's `hand`, with its joints in the world; `scale` is its size relative to the model."""
+def hand_poses(model: Hand, hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, HandPose]:
+    """Each hand with its joints in the world; `scale` is the size of the hands relative to the `model` hand's."""
     if not hands:
         return {}
-    angles = np.array([shown.angles for shown in hands.values()])
-    wrists = np.array([shown.wrist for shown in hands.values()])
-    rotations, joints = pose_in_world(hand, list(hands), angles, wrists, scale)
+    angles = np.array([hand.angles for hand in hands.values()])
+    wrists = np.array([hand.wrist for hand in hands.values()])
+    rotations, joints = pose_in_world(model, list(hands), angles, wrists, scale)
     return {
         side: HandPose(
-            state=shown.state,
-            object=shown.prop,
+            state=hand.state,
+            object=hand.prop,
             scale=scale,
-            angles=shown.angles,
+            angles=hand.angles,
             rotations=rotations[i],
-            wrist=shown.wrist,
+            wrist=hand.wrist,
             joints=joints[i],
         )
-        for i, (side, shown) in enumerate(hands.items())
+        for i, (side, hand) in enumerate(hands.items())
     }

@@ -20,7 +20,7 @@ class LiveHand:
     """The state of one hand between ticks."""
 
     def __init__(self, hand: Hand, side: Side, rest_angles: Array, limits: Array, telemetry: Telemetry) -> None:
-        """`rest_angles (A,)` and `limits (A, 2)` of the model's `hand` are in radians."""
+        """`hand` is the model's; `rest_angles (A,)` and `limits (A, 2)` are in radians."""
         self.side: Side = side
         self.prop: str | None = None
         """The prop to which the fingers belong, by name."""

@@ -40,7 +40,6 @@ MAX_OBJECTS: Final = 32
 SCALE_RANGE: Final = (0.2, 5.0)
 """Allowed scale factors of a hand."""
 
-
 TRACKED: Final = "what is tracked"
 SYNTHESIS: Final = "how the fingers are synthesised"
 SERVER: Final = "where the server listens, and who may connect"
@@ -79,8 +78,7 @@ class ActorConfig:
     objects: tuple[ObjectConfig, ...] = ()
     hand_scale: float = 1.0
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Lower and upper limit, in radians, of angles named in `hand_names.ANGLE_NAMES`; they narrow the model's
-    limits."""
+    """Lower and upper limit, in radians, of some of `wire.hand_names.ANGLE_NAMES`; they narrow the model's limits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +101,10 @@ class ServerConfig:
         "auto", Choice(PROVIDERS), "what the network runs on; auto takes a GPU if one can be used", group=SYNTHESIS
     )
     solver: str = option(
-        DEFAULT_SOLVER, Choice(tuple(SOLVERS)), "inverse kinematics that corrects the contacts", group=SYNTHESIS
+        DEFAULT_SOLVER,
+        Choice(tuple(SOLVERS)),
+        "inverse kinematics that corrects the contacts: " + ", ".join(f"{s.name} ({s.help})" for s in SOLVERS.values()),
+        group=SYNTHESIS,
     )
     look_ahead_s: float = option(
         MAX_LOOK_AHEAD_S,

@@ -1,4 +1,4 @@
-"""What can be laid over a hand: its sensors, its contacts, where inverse kinematics aims, and where it is going."""
+"""What can be drawn over a hand: its sensors, its contacts, the targets of inverse kinematics, and its future path."""
 
 from typing import Final
 
@@ -18,22 +18,22 @@ from manipnet.wire import Side
 
 OVERLAYS: Final = {
     "ambient": "Ambient sensor",
-    "proximity": "Proximity",
+    "proximity": "Proximity sensors",
     "contacts": "Contacts",
     "targets": "IK targets",
-    "ghost": "Ghost ahead",
+    "ghost": "Future pose",
 }
-"""Names of the layers, and what people call them."""
+"""The overlays by name, with their labels."""
 SENSED: Final = ("ambient", "proximity", "contacts", "targets")
 CONTACT_M: Final = 0.004
-"""A sensor nearer than this touches."""
+"""A sensor within this distance of the surface counts as a contact."""
 
 NEAR, FAR = np.array([255.0, 92.0, 60.0]), np.array([70.0, 140.0, 255.0])
 AMBIENT_COLOR: Final = (255, 190, 80)
 TOUCH_COLOR: Final = (255, 72, 40)
 TARGET_COLOR: Final = (80, 255, 160)
 OCCUPIED: Final = 0.3
-"""Share of a cell inside the object from which it is shown."""
+"""A cell is drawn if at least this share of it is inside the object."""
 RAW_COLOR: Final = (255, 255, 255)
 PATH_COLOR: Final = (140, 190, 255)
 
@@ -64,7 +64,7 @@ class HandOverlays:
         )
 
     def show(self, senses: Senses | None, shown: set[str]) -> None:
-        """The layers in `shown`; none without senses."""
+        """Draw the overlays in `shown`; without senses, hide all of them."""
         shown = shown if senses is not None else set()
         self._ambient.visible = "ambient" in shown
         self._rays.visible = self._points.visible = "proximity" in shown
@@ -104,7 +104,7 @@ class HandOverlays:
 
 
 class Ghost:
-    """Where wrists and props of one actor will be at the end of the window, and the way there."""
+    """The poses of one actor's wrists and props at the end of the window, and the paths to them."""
 
     def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
         self._scene, self._name, self._hand = scene, name, hand
@@ -113,7 +113,7 @@ class Ghost:
         self._paths: dict[str, viser.LineSegmentsHandle] = {}
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], visible: bool) -> None:
-        """As of one tick."""
+        """Draw one tick."""
         message = frame.message
         ends = {name: window[-1] for name, window in frame.windows.items()}
         self._props.show(frame.props, shapes, ends, visible)
@@ -143,7 +143,7 @@ class Ghost:
 
 
 class ActorOverlays:
-    """All layers of one actor, under `name`."""
+    """All overlays of one actor, under `name`."""
 
     def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
         self._scene, self._name, self._hand, self._senser = scene, name, hand, Senser(hand)
@@ -151,7 +151,7 @@ class ActorOverlays:
         self._ghost = Ghost(scene, f"{name}/ghost", hand)
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], shown: set[str]) -> None:
-        """The layers in `shown`, of one tick."""
+        """Draw the overlays in `shown` of one tick."""
         self._ghost.show(frame, shapes, "ghost" in shown)
         props = {prop.name: prop for prop in frame.props}
         for side in ("left", "right"):

@@ -1,4 +1,4 @@
-"""What a hand senses and aimed for at a tick, computed for the eye: in the page's process, by the network's kernels.
+"""What a hand senses and aims for at a tick, computed for display in the page's process with the network's kernels.
 
 The sensors are those of the hand as it is shown. The network's own were on the pose it went on from, a tick before and
 without its grip: they would be up to a centimetre beside the fingers.
@@ -36,14 +36,14 @@ class Senses:
 
 
 class Senser:
-    """Senses with shapes, each of which is built, or read from the cache, once."""
+    """Computes snapshots; each shape is built, or read from the cache, once."""
 
     def __init__(self, hand: Hand) -> None:
         self._hand = hand
         self._shapes: dict[str, Shape] = {}
 
     def sense(self, frame: Frame, side: Side, view: ShapeView, prop_scale: float) -> Senses:
-        """What the hand of one side senses of the shape it is about."""
+        """The snapshot of one hand and the shape of its prop."""
         hand, shown = frame.hands[side], frame.message.hands[side]
         size, positions, rotations = shown.scale, *forward_kinematics(self._hand, np.asarray(shown.angles, np.float64))
         wrist, obj = (
@@ -88,5 +88,5 @@ class Senser:
 
 
 def _present(frame: Frame, name: str) -> Array:
-    """Where a body is at the tick."""
+    """The pose of a body at the tick."""
     return frame.windows[name][len(frame.windows[name]) // 2]

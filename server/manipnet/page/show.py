@@ -27,7 +27,7 @@ class Show:
     """Draws frames of the live session, or of a recording while one is open."""
 
     def __init__(self, server: viser.ViserServer, hand: Hand, drawn: Callable[[Frame | None], None]) -> None:
-        """`hand` is the hand that is shown.
+        """`hand` is the one that is drawn.
 
         `drawn` is called with every live frame that was drawn, and with None for a frame of a recording.
         """

@@ -1,4 +1,4 @@
-"""A viser server that only answers whom it should: on a socket that is given, to pages of its own, without a tunnel."""
+"""A viser server on a given socket that answers only its own pages and opens no public tunnel."""
 
 import asyncio
 import contextlib
@@ -20,9 +20,9 @@ from manipnet.net.addresses import is_loopback
 from manipnet.outputs.websocket.server import LOCAL_PAGES
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
-"""Whether the connection being served may change anything: a page of this machine, looked at on this machine."""
+"""Whether the visitor may change anything: a browser on this machine that shows a page of this machine."""
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
-"""What the page adds to viser's own: a title, and files that are dropped on it."""
+"""What the page adds to viser's client: a title, and the import of files that are dropped on it."""
 DROP_PATH: Final = "/drop"
 _POLICY_VIOLATION: Final = 1008
 
@@ -38,9 +38,9 @@ class Server(viser.ViserServer):
 
 
 def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server:
-    """Serve on a socket that already listens; on loopback only pages of this machine come in.
+    """Serve on a socket that already listens; on loopback, only pages of this machine may connect.
 
-    `dropped` is given the name and content of a file an operator dropped on the page, and says what became of it.
+    `dropped` receives the name and content of a file that an operator dropped on the page, and returns a message.
     """
     with _served_on(listener, dropped):
         return Server(host="127.0.0.1", port=0, label=label, verbose=False)
@@ -48,7 +48,7 @@ def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server
 
 @contextlib.contextmanager
 def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
-    """Viser has neither an option for a socket nor one for origins, so what it calls is stood in for."""
+    """Viser has no option for a socket or for origins, so the function that it calls is replaced meanwhile."""
     original = websockets.asyncio.server.serve
     exposed = not is_loopback(listener.getsockname()[0])
 
@@ -65,7 +65,7 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             if not may_look(request.headers, exposed):
                 return connection.respond(HTTPStatus.FORBIDDEN, "This page is not for other web sites.\n")
-            with contextlib.suppress(KeyError):  # the script is put into what has not been compressed
+            with contextlib.suppress(KeyError):  # the script is inserted into the uncompressed page
                 del request.headers["Accept-Encoding"]
             response = process_request(connection, request)
             return _with_script(response) if urlsplit(request.path).path == "/" else response
@@ -95,9 +95,9 @@ def may_act(address: str, headers: Any) -> bool:
 
 
 async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
-    """One file: its name in the query, its content the only message."""
+    """Receive one file: its name is in the query, its content is the only message."""
     if not OPERATOR.get():
-        await connection.close(_POLICY_VIOLATION, "only the server's own machine may bring in files")
+        await connection.close(_POLICY_VIOLATION, "only a browser on the server's own machine may import files")
         return
     name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
     with contextlib.suppress(ConnectionClosed):

@@ -59,22 +59,12 @@ def pose_a_hand(bundle: Bundle, solver: str = DEFAULT_SOLVER) -> None:
     """Decode and solve one pose: at a first start this process compiles the solver, while another compiles the rest."""
     shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
-    outputs, before = bundle.infer(np.zeros((1, bundle.layout.input_size), np.float32)), bundle.rest_angles[None]
-    poses = allocate_poses(bundle.hand, 1)
+    hand, layout, before = bundle.hand, bundle.layout, bundle.rest_angles[None]
+    outputs = bundle.infer(np.zeros((1, layout.input_size), np.float32))
+    poses = allocate_poses(hand, 1)
     poses.correction[:] = 0.0
-    pose_kernel(solver)(
-        bundle.hand.packed,
-        bundle.layout.output_starts,
-        shape.solid,
-        windows,
-        outputs,
-        before,
-        bundle.response,
-        bundle.limits,
-        0,
-        1,
-        poses,
-    )
+    network = outputs, before, bundle.response, bundle.limits
+    pose_kernel(solver)(hand.packed, layout.output_starts, shape.solid, windows, *network, 0, 1, poses)
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

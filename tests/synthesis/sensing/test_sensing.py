@@ -153,6 +153,7 @@ def test_features_agree_with_the_slow_version(body, hands):
                 np.testing.assert_allclose(fast, expected, atol=tolerance.get(name, 2e-6), err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_left_hand_in_the_mirrored_scene_is_a_right_hand(body, hands, tmp_path):
     """The same scene, its object built as a mirrored mesh instead of being mirrored by the kernels."""
     shape, _ = body

@@ -18,7 +18,7 @@ from manipnet.synthesis.hand.skin import skinned
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.synthesizer import hand_to_world
-from manipnet.wire import BodyPose, HandsMessage
+from manipnet.wire import BodyPose, HandsMessage, State
 from manipnet_tools import cli
 from manipnet_tools.export.animation import Animation, ExportError, HandTrack, hand_track, read_animation
 from manipnet_tools.export.bvh_out import write_bvh
@@ -54,7 +54,7 @@ def animation(angles: dict[str, np.ndarray]) -> Animation:
     """Two hands and two props, of which one has a mesh."""
     rng = np.random.default_rng(4)
     hands = {}
-    for side, away_m in (("left", -0.2), ("right", 0.2)):
+    for side, away_m in zip(SIDES, (-0.2, 0.2), strict=True):
         positions, rotations = forward_kinematics(HAND, angles[side])
         hands[side] = hand_track(HAND, *hand_to_world(side, path_of(rng, away_m), positions, rotations))
     seen = np.arange(FRAMES) != 7
@@ -241,7 +241,7 @@ def test_a_hand_of_another_size_is_exported_at_its_size(animation: Animation, an
     )
 
 
-def message(seq: int, t_s: float, x: float, state: str = "live", actor: str = "ann") -> HandsMessage:
+def message(seq: int, t_s: float, x: float, state: State = "live", actor: str = "ann") -> HandsMessage:
     """A hands message of a half-closed left hand at `x`."""
     shown = ShownHand(state, HAND.limits @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), "Box")
     hands = hand_poses(HAND, {"left": shown}, 0.9)

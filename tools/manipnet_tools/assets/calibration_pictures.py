@@ -7,11 +7,10 @@ from typing import Any, Final
 import numpy as np
 
 from manipnet.actors.calibration import HAND_LENGTH_M, MARK_M, wrist_on_sheet
-from manipnet.geometry import Array, mirror_points, transform
+from manipnet.geometry import Array, Side, mirror_points, transform
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.skin import skinned
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet.synthesis.synthesizer import Side
 
 HOUSE: Final = Path(__file__).parents[3]
 IMAGES, PAGE = HOUSE / "docs" / "images", HOUSE / "server" / "manipnet" / "page"

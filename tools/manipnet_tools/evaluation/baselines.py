@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.features import features
 from manipnet.synthesis.model.layout import Layout, layout_of
-from manipnet.synthesis.synthesizer import HandState, Side, windows_of
+from manipnet.synthesis.synthesizer import HandState, windows_of
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.takes.rollout import HandInput
 

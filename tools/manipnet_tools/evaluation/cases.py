@@ -6,11 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from manipnet import geometry
-from manipnet.geometry import SIDES, Array
+from manipnet.geometry import SIDES, Array, Side
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import Shape, load_shape
-from manipnet.synthesis.synthesizer import Side
 from manipnet_tools.evaluation import metrics, physics
 from manipnet_tools.evaluation.metrics import Gaps, Mask
 from manipnet_tools.takes.rollout import HandInput, Ticks, hand_inputs, tick_take

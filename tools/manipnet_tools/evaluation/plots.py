@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipnet import geometry
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
 from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.synthesizer import Side
 from manipnet_tools.evaluation import metrics
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.rendering import (

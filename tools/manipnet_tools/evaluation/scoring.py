@@ -5,8 +5,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from manipnet.geometry import Array
-from manipnet.synthesis.synthesizer import Side
+from manipnet.geometry import Array, Side
 from manipnet_tools.evaluation import metrics, physics
 from manipnet_tools.evaluation.cases import Case
 

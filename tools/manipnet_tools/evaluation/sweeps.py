@@ -12,11 +12,11 @@ import numpy as np
 import trimesh
 
 from manipnet import geometry
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
-from manipnet.synthesis.synthesizer import Side, Synthesizer
+from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines, metrics, physics
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case, data_folders, load_case
 from manipnet_tools.evaluation.roll_outs import synthesise

@@ -8,11 +8,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from manipnet.geometry import Array, mirror_points, quat_conjugate, quat_multiply, quat_rotate
+from manipnet.geometry import Array, Side, mirror_points, quat_conjugate, quat_multiply, quat_rotate
 from manipnet.recording.mcap_file import read_hands
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
-from manipnet.synthesis.synthesizer import Side
 from manipnet.wire import SIDES, HandsMessage
 from manipnet_tools.takes.meshes import recorded_meshes
 from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
@@ -71,7 +70,7 @@ class Animation:
 
 
 def read_animation(path: Path, model: Hand, actor: str | None = None) -> Animation:
-    """Fingers of the hand `model` from a recording (of one `actor`, the first by default), a file of
+    """Fingers of the hand `model` from a recording (of one `actor`, the first by default), the file of
     `manipnet synthesize`, or a take.
 
     Raises `ExportError`, `TakeError`, `RecordingError` and `MeshError`.

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from manipnet.geometry import Array, mirror_quats, quat_conjugate, quat_multiply, quat_to_matrix
+from manipnet.geometry import Array, Side, mirror_quats, quat_conjugate, quat_multiply, quat_to_matrix
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import angles_from_rotations
-from manipnet.synthesis.synthesizer import Side
 from manipnet_tools.export.animation import Animation, HandTrack
 
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
