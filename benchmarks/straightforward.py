@@ -12,20 +12,13 @@ import torch
 import trimesh
 
 from manipnet.geometry import mirror_points, mirror_poses, quat_log, quat_multiply, quat_to_matrix
-from manipnet.synthesis.hand.skeleton import PARENTS
-from manipnet.synthesis.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
-from manipnet.synthesis.model.layout import (
-    ENCODED,
-    INPUT,
-    INPUT_SIZE,
-    OUTPUT,
-    OUTPUT_SIZE,
-    PRESENT,
-    SENSED,
-    WINDOW_STEP_S,
-)
-from manipnet.synthesis.sensing.ambient import CELL_M, CELLS, CENTER_M
+from manipnet.synthesis.model.layout import PRESENT, SENSED, WINDOW_STEP_S, layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet.synthesis.sensing.ambient import CELL_M, CELL_OFFSETS_M
 from manipnet.synthesis.synthesizer import HandScene, HandState
+
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
 
 RANGE_M = 0.10
 NEAR_M = 0.028
@@ -39,12 +32,12 @@ class Network(torch.nn.Module):
 
     def __init__(self, width: int) -> None:
         super().__init__()
-        self.columns = list(ENCODED.values())
+        self.columns = list(LAYOUT.encoded.values())
         self.encoders = torch.nn.ModuleList(torch.nn.Linear(c.stop - c.start, width // 3) for c in self.columns)
         self.layers = torch.nn.ModuleList(torch.nn.Linear(width, width) for _ in range(4))
-        self.decoder = torch.nn.Linear(width, OUTPUT_SIZE)
-        self.register_buffer("mean", torch.zeros(INPUT_SIZE))
-        self.register_buffer("deviation", torch.ones(INPUT_SIZE))
+        self.decoder = torch.nn.Linear(width, LAYOUT.output_size)
+        self.register_buffer("mean", torch.zeros(LAYOUT.input_size))
+        self.register_buffer("deviation", torch.ones(LAYOUT.input_size))
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:
         """Features `(N, 2356)` to outputs `(N, 220)`."""
@@ -98,13 +91,13 @@ class Straightforward:
 
     def features(self, scene: HandScene, state: HandState) -> np.ndarray:
         """The network's inputs `(2356,)` of one hand, float32."""
-        row = np.empty(INPUT_SIZE, np.float32)
+        row = np.empty(LAYOUT.input_size, np.float32)
 
         def put(name: str, values: np.ndarray) -> None:
-            row[INPUT[name].columns] = values.reshape(-1)
+            row[LAYOUT.input[name].columns] = values.reshape(-1)
 
         put("joint_positions", state.positions)
-        put("joint_axes", _axes(np.concatenate([state.rotations, state.rotations[PARENTS[17:]]])))
+        put("joint_axes", _axes(np.concatenate([state.rotations, state.rotations[HAND.parents[17:]]])))
         self._put_trajectories(scene, put)
         views = [_view(scene, t) for t in SENSED]
         points, normals = _skin(state)
@@ -133,9 +126,7 @@ class Straightforward:
         put("object_angular_velocities", np.concatenate([turns[:1], turns]) @ frame)
 
     def _ambient(self, view: View) -> np.ndarray:
-        steps = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
-        cells = CENTER_M + np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1).reshape(-1, 3)
-        points = view.to_object(cells)
+        points = view.to_object(HAND.sensors.grid_center + CELL_OFFSETS_M)
         closest, distance, _ = trimesh.proximity.closest_point(self.mesh, points)
         offset = np.abs(view.direction_to_wrist(closest - points)) * view.scale
         meets = np.all(offset <= 0.5 * CELL_M, axis=1)
@@ -159,8 +150,8 @@ class Straightforward:
         return sign * distance * view.scale, view.direction_to_wrist(outward)
 
     def _targets(self, scene: HandScene, output: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        joints = output[OUTPUT["joint_positions"].columns].reshape(22, 3)
-        predicted = np.clip(output[OUTPUT["distances"].columns], 0.0, 0.035)
+        joints = output[LAYOUT.output["joint_positions"].columns].reshape(22, 3)
+        predicted = np.clip(output[LAYOUT.output["distances"].columns], 0.0, 0.035)
         measured, outward = self._distances(_view(scene, PRESENT), joints)
         final = np.where(measured < 0.0, 0.8 * predicted + 0.2 * measured, 0.2 * predicted + 0.8 * measured)
         step = np.where(predicted <= NEAR_M, final - measured, 0.0)
@@ -182,8 +173,8 @@ def _axes(rotations: np.ndarray) -> np.ndarray:
 
 def _skin(state: HandState) -> tuple[np.ndarray, np.ndarray]:
     """Points and unit normals `(104, 3)` of the sensors on the posed hand."""
-    rotations, positions = state.rotations[SENSOR_BONES], state.positions[SENSOR_BONES]
-    points = positions + np.einsum("skij,skj->ski", rotations, SENSOR_POINTS)
-    normals = np.einsum("skij,skj->ski", rotations, SENSOR_NORMALS)
-    points, normals = (np.einsum("sk,ski->si", SENSOR_WEIGHTS, values) for values in (points, normals))
+    rotations, positions = state.rotations[HAND.sensors.bones], state.positions[HAND.sensors.bones]
+    points = positions + np.einsum("skij,skj->ski", rotations, HAND.sensors.points)
+    normals = np.einsum("skij,skj->ski", rotations, HAND.sensors.normals)
+    points, normals = (np.einsum("sk,ski->si", HAND.sensors.weights, values) for values in (points, normals))
     return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)

@@ -12,9 +12,9 @@ import numpy as np
 from manipnet import __version__
 from manipnet.geometry import matrix_to_quat
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS, webxr_name
-from manipnet.synthesis.hand.skeleton import DOF_COUNT, DOF_NAMES, JOINT_NAMES
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire.bodies import MAX_BODIES
+from manipnet.wire.hand_names import ANGLE_NAMES, BONE_NAMES, OPENXR_JOINT_NAMES, OPENXR_PARENTS, webxr_name
 from manipnet.wire.hands import (
     BODY,
     HAND,
@@ -40,7 +40,7 @@ NUMBERS = {
     "joint_count": HAND["joints"].shape[0],
     "rate_hz": 60,
 }
-_zero_positions, _zero_matrices = forward_kinematics(np.zeros(DOF_COUNT))
+_zero_positions, _zero_matrices = forward_kinematics(shipped_hand(), np.zeros(len(ANGLE_NAMES)))
 ZERO_POSE = {
     "zero_positions": _zero_positions.round(8) + 0.0,
     "zero_rotations": matrix_to_quat(_zero_matrices).round(8) + 0.0,
@@ -50,8 +50,8 @@ ZERO_POSE = {
 NAMES = {
     "states": STATES,
     "joint_names": OPENXR_JOINT_NAMES,
-    "bone_names": JOINT_NAMES[: NUMBERS["bone_count"]],
-    "angle_names": DOF_NAMES,
+    "bone_names": BONE_NAMES,
+    "angle_names": ANGLE_NAMES,
 }
 VERSION_KEYS = {
     "blender/manipnet_live/blender_manifest.toml": "version",

@@ -86,7 +86,7 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 def picture(page: Page, second: float) -> Image.Image:
     """What the page looks like at an instant of the recording."""
-    page.type("Second", f"{second:.2f}")
+    page.type("Time, s", f"{second:.2f}")
     time.sleep(0.7)  # the browser draws once or twice in this time
     page.evaluate("document.activeElement.blur()")
     screenshot = base64.b64decode(page.call("Page.captureScreenshot")["data"])

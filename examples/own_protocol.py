@@ -4,8 +4,8 @@
 
 Each datagram is one frame: a line with the time in seconds, then a line for each body with its name, position (metres)
 and quaternion, separated by spaces. The declaration at the end gives the protocol its flag, its key in rig files and
-its counters. To make it part of the server, put this file into server/manipnet/inputs/ and its declaration into `INPUTS`
-there; `manipnet doctor` and the tables of the documentation then know it too.
+its counters. To make it part of the server, put this file into server/manipnet/inputs/ and its declaration into the
+tuple `INPUTS` there; `manipnet doctor` and the tables of the documentation then know it too.
 """
 
 import sys
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from manipnet import cli, inputs
 from manipnet.common.options import Port, option
 from manipnet.inputs.declaration import Input, Receiver, Reception
+from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import UdpThread, bind_udp
 from manipnet.wire.bodies import MAX_TIME_S, BodyFrame, BodySample, check_distinct, check_name, make_sample
 
@@ -35,8 +36,17 @@ class TextBodies(Receiver):
     def start(self) -> None:
         """Bind the port and begin to receive."""
         udp = bind_udp(self._host, self._port)
-        self.address = "udp://{}:{}".format(*udp.getsockname())
-        self._thread = UdpThread(udp, self._receive, idle=lambda now_s: 0.1, lost=lambda count: None)
+        host, port = udp.getsockname()
+        self.address = f"udp://{host}:{port}"
+        health = ReceiverHealth("text", self._intake.telemetry)
+        self._thread = UdpThread(
+            udp,
+            reopen=lambda: bind_udp(host, port),
+            receive=self._receive,
+            idle=lambda now_s: 0.1,
+            lost=lambda count: None,
+            health=health,
+        )
         self._thread.start()
 
     def stop(self) -> None:

@@ -12,7 +12,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import msgpack
 import zmq
 from manipnet_client import ControlClient
 from send_bodies import RATE_HZ, bodies, frame_times
@@ -37,7 +36,7 @@ def perform(bodies_in: str) -> None:
     with zmq.Context() as context, context.socket(zmq.PUB) as socket:
         socket.connect(bodies_in)
         for t_s in itertools.islice(frame_times(), int(SECONDS * RATE_HZ)):
-            socket.send(msgpack.packb({"t": t_s, "bodies": bodies(t_s)}))
+            socket.send_json({"t": t_s, "bodies": bodies(t_s)})
 
 
 if __name__ == "__main__":

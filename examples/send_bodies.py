@@ -3,8 +3,8 @@
     manipnet-serve --mesh Box=cube
     python examples/send_bodies.py [tcp://127.0.0.1:5556]
 
-Each ZeroMQ message is one frame: the time at which the tracker saw the bodies, and every body that it saw. Poses are
-right-handed, Y up, in metres, with quaternions x y z w; docs/protocol-in.md lists the keys.
+Each ZeroMQ message is one frame, in JSON or msgpack: the time at which the tracker saw the bodies, and every body that
+it saw. Poses are right-handed, Y up, in metres, with quaternions x y z w; docs/protocol-in.md lists the keys.
 """
 
 import contextlib
@@ -14,7 +14,6 @@ import sys
 import time
 from collections.abc import Iterator
 
-import msgpack
 import zmq
 
 RATE_HZ = 120.0
@@ -25,7 +24,7 @@ def main(address: str = "tcp://127.0.0.1:5556") -> None:
     with zmq.Context() as context, context.socket(zmq.PUB) as socket:
         socket.connect(address)
         for t_s in frame_times():
-            socket.send(msgpack.packb({"t": t_s, "bodies": bodies(t_s)}))
+            socket.send_json({"t": t_s, "bodies": bodies(t_s)})
 
 
 def frame_times() -> Iterator[float]:

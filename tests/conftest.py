@@ -4,6 +4,7 @@ import os
 import queue
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -22,7 +23,8 @@ PATIENCE_S = 20.0
 STARTS_PROCESSES = {"subprocess", "multiprocessing", "serving", "publishing", "browsing", "run_node"}
 """A module that imports one of these has tests that start programs."""
 TESTS = Path(__file__).parent
-SLOW_FOLDERS = (TESTS / "tools/training", TESTS / "tools/bench")
+SLOW = (TESTS / "tools/training", TESTS / "tools/bench", TESTS / "tools/doctor", TESTS / "runtime/test_bad_network.py")
+"""Folders and files whose tests take a second each."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -31,7 +33,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         fixtures, module = getattr(item, "fixturenames", ()), getattr(item, "module", None)
         if item.path.is_relative_to(TESTS / "clients"):
             item.add_marker("client")
-        if any(map(item.path.is_relative_to, SLOW_FOLDERS)):
+        if any(map(item.path.is_relative_to, SLOW)):
             item.add_marker("slow")
         if "manipnet_data" in fixtures:
             item.add_marker("dataset")
@@ -39,6 +41,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("process")
         if not {"client", "dataset", "process", "slow"} & {marker.name for marker in item.iter_markers()}:
             item.add_marker("quick")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With `-n`, each worker takes whole files, because the servers that tests share live as long as a module."""
+    from xdist.scheduler import LoadFileScheduling
+
+    return LoadFileScheduling(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Counters with closed labels, timings, the log that cannot be flooded, and where frames wait."""
+"""Counters with closed labels, timings, gauges, the log that cannot be flooded, and the mailbox."""
 
 import ast
 import json
@@ -43,7 +43,7 @@ def test_a_counter_or_label_that_is_not_declared_is_an_error(name: str, label: d
     telemetry = Telemetry()
     telemetry.declare("frames_in", "osc")
     with pytest.raises(KeyError):
-        telemetry.count(name, **label)
+        telemetry.count(name, 1, **label)
 
 
 def test_what_is_declared_twice_is_one_label() -> None:
@@ -92,7 +92,7 @@ def test_timings_keep_all_and_the_newest() -> None:
     assert timings.totals("total") == (1000, pytest.approx(500.5))
 
 
-def test_gauges_are_read_when_they_are_asked_for() -> None:
+def test_gauges_are_measured_when_they_are_read() -> None:
     telemetry, level = Telemetry(), {"hands": 1.0}
     telemetry.add_gauges(lambda: [("connections", "socket", dict(level))])
     telemetry.add_gauges(lambda: iter(()))
@@ -104,7 +104,7 @@ def record(text: str, level: int = logging.WARNING) -> logging.LogRecord:
     return logging.LogRecord("manipnet", level, __file__, 1, text, (), None)
 
 
-def test_a_line_that_repeats_is_held_back_and_summed_up() -> None:
+def test_repeated_lines_are_held_back_and_counted() -> None:
     now = [0.0]
     limit = RepeatFilter(lambda: now[0], interval_s=5.0)
     shown = []
@@ -161,7 +161,7 @@ def test_a_question_is_answered_on_the_tick_thread() -> None:
     assert answers == [threading.get_ident()]
 
 
-def test_an_error_in_a_question_goes_to_who_asked() -> None:
+def test_an_error_in_a_question_goes_to_the_thread_that_asked() -> None:
     mailbox, errors = Mailbox(Telemetry()), []
 
     def ask() -> None:
@@ -176,7 +176,7 @@ def test_an_error_in_a_question_goes_to_who_asked() -> None:
     assert errors == [True]
 
 
-def test_questions_nobody_answers_are_given_up_and_bounded() -> None:
+def test_unanswered_questions_time_out_and_are_bounded() -> None:
     mailbox = Mailbox(Telemetry())
     for _ in range(MAX_REQUESTS):
         with pytest.raises(BusyError, match="did not answer"):
@@ -189,7 +189,7 @@ def test_questions_nobody_answers_are_given_up_and_bounded() -> None:
 
 
 class FakeActor:
-    """What the watch looks at: a name and the age of one body."""
+    """The part of an actor that the watch reads: its name and the age of one body."""
 
     def __init__(self) -> None:
         self.config = type("Config", (), {"name": "ann"})
@@ -199,7 +199,9 @@ class FakeActor:
         return {"left_wrist": BodyHealth(120.0, self.age_s)}
 
 
-def test_silence_is_said_once_at_3_and_at_10_seconds_and_when_it_ends(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_lost_body_is_reported_after_3_and_10_seconds_and_when_it_is_back(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     watch, actor = SilenceWatch(), FakeActor()
     for age_s in (float("inf"), 0.1, 1.0, 2.0, 3.5, 4.0, 9.0, 10.5, 11.0, 0.1, 0.2):
         actor.age_s = age_s

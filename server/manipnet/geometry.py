@@ -3,10 +3,15 @@
 Project frame: right-handed, Y up, metres. A *pose* is seven numbers, position xyz then quaternion xyzw, `(..., 7)`.
 """
 
+from typing import Final, Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+Side = Literal["left", "right"]
+SIDES: Final[tuple[Side, Side]] = ("left", "right")
 
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 """Reflection through the plane x = 0, which turns a left hand into a right one."""
@@ -37,7 +42,7 @@ def quat_rotate(q: Array, v: Array) -> Array:
 
 
 def _cross(a: Array, b: Array) -> Array:
-    """`np.cross` of vectors `(..., 3)`, a tenth of its time on the few vectors of a hand."""
+    """`np.cross` of vectors `(..., 3)`, in a tenth of its time for the few vectors of a hand."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     product = np.empty(np.broadcast_shapes(a.shape, b.shape))
@@ -45,6 +50,12 @@ def _cross(a: Array, b: Array) -> Array:
     product[..., 1] = az * bx - ax * bz
     product[..., 2] = ax * by - ay * bx
     return product
+
+
+def continuous_quats(q: Array) -> Array:
+    """The same rotations `(T, 4)` with signs chosen so that each quaternion is in its predecessor's hemisphere."""
+    flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0)
+    return q * np.cumprod(np.concatenate([[1.0], flips]))[:, None]
 
 
 def quat_normalize(q: Array) -> Array:
@@ -124,6 +135,11 @@ def invert(T_a_b: Array) -> Array:
 def transform(T_a_b: Array, p_b: Array) -> Array:
     """Points `(..., 3)` from frame b to frame a."""
     return T_a_b[..., :3] + quat_rotate(T_a_b[..., 3:], p_b)
+
+
+def scale_positions(T: Array, factor: float) -> Array:
+    """Poses `(..., 7)` with their positions multiplied by `factor` and their rotations kept."""
+    return T * np.array([factor, factor, factor, 1.0, 1.0, 1.0, 1.0])
 
 
 def mirror_points(p: Array) -> Array:

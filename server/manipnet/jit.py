@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba import njit, types
 from numba.core import cgutils, config
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
+from numba.np.numpy_support import as_dtype
 from platformdirs import user_cache_dir
 
 from manipnet.common import kernel_cache
@@ -36,11 +38,14 @@ the compiling."""
 def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
     """A function for kernels that gives an array of this shape to work in, unfilled and gone when they return.
 
-    One place for each call in the source, so an array made in a loop is the same one every time round.
+    One place for each call in the source, so an array made in a loop is the same one every time round. With
+    `NUMBA_DISABLE_JIT=1`, kernels are plain Python, and so is the array.
     """
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]: set at run time
+        return lambda: np.empty(shape, as_dtype(dtype))
 
     @intrinsic
-    def room(_):
+    def array_on_stack(_):
         kind = types.Array(dtype, len(shape), "C")
 
         def generate(context, builder, _signature, _arguments):
@@ -57,7 +62,7 @@ def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
 
         return kind(), generate
 
-    return room
+    return array_on_stack
 
 
 matrix, vector = stack_array(3, 3), stack_array(3)
@@ -84,7 +89,7 @@ def _package_state() -> str:
     package = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
     files = (p for part in COMPILED for p in (package / part, *(package / part).rglob("*")))
-    for path in sorted(p for p in files if p.suffix in (".py", ".npz")):
+    for path in sorted(p for p in files if p.suffix == ".py"):
         stat = path.stat()
         digest.update(f"{path.relative_to(package)} {stat.st_size} {stat.st_mtime_ns}".encode())
     return digest.hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""Calibration: any cluster on any hand, shown on any sheet, and everything that is no such showing."""
+"""Calibration of any cluster on any hand and any sheet, and the refusal of everything else."""
 
 import numpy as np
 import pytest
@@ -23,20 +23,23 @@ from manipnet.actors.calibration import (
 from manipnet.actors.plan import synthesise
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, BodyConfig
-from manipnet.geometry import Array, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
+from manipnet.geometry import Array, Side, compose, invert, mirror_points, quat_exp, quat_multiply, quat_rotate
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.surface import skin
+from manipnet.synthesis.hand.skin import skinned
 from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
-from manipnet.synthesis.synthesizer import Side, Synthesizer
+from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
+
+HAND = shipped_hand()
 
 SIDES: tuple[Side, Side] = ("left", "right")
 SAMPLES = 240
 NOISE_M, NOISE_RAD = 0.5e-3, np.radians(0.7)
-"""Of a cluster whose markers, 4 cm from its middle, are each seen within half a millimetre."""
+"""Noise of a cluster whose markers, 4 cm from its middle, are each seen within half a millimetre."""
 HERE = sheet_at(np.array([0.3, 0.74, -0.2]), 0.4)
 
 numbers = st.floats(-1.0, 1.0)
@@ -49,7 +52,7 @@ def pose(p, q=(0.0, 0.0, 0.0, 1.0)) -> Array:
 
 
 def noisy(poses: Array, seed: int = 0, size: float = 1.0) -> Array:
-    """As a tracker sees them; signs of quaternions flip freely."""
+    """The poses as a tracker sees them, with noise and with quaternions whose signs flip."""
     rng = np.random.default_rng(seed)
     p = poses[:, :3] + size * rng.normal(0.0, NOISE_M, (len(poses), 3))
     q = quat_multiply(poses[:, 3:], quat_exp(size * rng.normal(0.0, NOISE_RAD, (len(poses), 3))))
@@ -73,7 +76,7 @@ def test_any_cluster_is_found_within_two_millimetres_and_a_degree(side: Side, wh
 
 
 @given(turn=rotations, seed=st.integers(0, 999))
-def test_samples_that_are_elsewhere_are_left_out(turn, seed: int) -> None:
+def test_outliers_are_left_out(turn, seed: int) -> None:
     T = pose((0.4, 1.0, 0.2), turn)
     poses = held(T, seed)
     poses[5::8] = held(compose(T, pose((0.3, 0.1, 0.0), (1.0, 1.0, 0.0, 0.0))), seed + 1)[5::8]
@@ -103,14 +106,23 @@ def in_two_places() -> Array:
 @pytest.mark.parametrize(
     ("poses", "complaint"),
     [
-        (held(HERE)[:7], "left_wrist: 7 tracked samples in that time, 20 are the least; see that it is tracked"),
-        (moving(speed_m_s=0.005), r"left_wrist moved 6\.\d mm .* allowed are 3\.0 mm and 1\.5°; lay the hand down"),
-        (moving(spin_rad_s=0.05), r"left_wrist moved .* while it was to be still"),
-        (trembling(), r"left_wrist trembles by 5\.\d mm .* allowed are 3\.0 mm and 2\.0°; rest it on the table"),
-        (in_two_places(), "left_wrist: 80 of 240 samples are elsewhere than the rest; it moved, or its markers"),
+        (
+            held(HERE)[:7],
+            "left_wrist: only 7 tracked samples in that time, and at least 20 are needed; make sure that it is tracked",
+        ),
+        (
+            moving(speed_m_s=0.005),
+            r"left_wrist moved by 6\.\d mm .* at most 3\.0 mm and 1\.5° are allowed",
+        ),
+        (moving(spin_rad_s=0.05), r"left_wrist moved by .* while it had to be still"),
+        (
+            trembling(),
+            r"left_wrist trembles by 5\.\d mm .* at most 3\.0 mm and 2\.0° are allowed: rest it on the table",
+        ),
+        (in_two_places(), "left_wrist: 80 of 240 samples are far from the others; it moved, or its markers"),
     ],
 )
-def test_what_was_not_still_is_refused_with_the_reason(poses: Array, complaint: str) -> None:
+def test_a_body_that_was_not_still_is_refused_with_the_reason(poses: Array, complaint: str) -> None:
     with pytest.raises(CalibrationError, match=complaint):
         steady_pose(poses, "left_wrist")
 
@@ -133,8 +145,8 @@ def test_a_hand_that_is_not_on_its_mark_is_refused(side: Side) -> None:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_the_shown_pose_is_the_models_flat_hand_on_a_table(side: Side) -> None:
-    positions, rotations = forward_kinematics(np.zeros(20))
-    vertices = skin(positions, rotations)
+    positions, rotations = forward_kinematics(HAND, np.zeros(20))
+    vertices = skinned(HAND, positions, rotations)
     hand = mirror_points(vertices) if side == "left" else vertices
     hand = wrist_on_sheet(side)[:3] + quat_rotate(wrist_on_sheet(side)[3:], hand)
     heel = hand[np.abs(vertices[:, 0]) < 0.02]
@@ -173,18 +185,18 @@ def test_a_touch_elsewhere_is_refused(x: float, z: float, complaint: str) -> Non
 
 
 @given(yaw=st.floats(-3.0, 3.0), where=points)
-def test_a_tracked_prop_may_say_where_the_sheet_lies(yaw: float, where) -> None:
+def test_a_tracked_prop_may_tell_where_the_sheet_lies(yaw: float, where) -> None:
     T_world_sheet = sheet_at(np.array(where), yaw)
     found = sheet_under(upright_on_sheet(T_world_sheet, -0.03), where[1])
     assert np.allclose(difference(found, T_world_sheet), 0.0, atol=1e-6)
 
 
-def test_a_prop_on_its_head_says_nothing() -> None:
-    with pytest.raises(CalibrationError, match="x axis points up or down"):
+def test_a_prop_whose_x_axis_is_vertical_is_refused() -> None:
+    with pytest.raises(CalibrationError, match="x axis of the reference object points up or down"):
         sheet_under(pose((0, 0, 0), (0.0, 0.0, 1.0, 1.0)), 0.0)
 
 
-# --- what comes of it
+# --- the fingers after a calibration
 
 
 @pytest.fixture(scope="module")
@@ -230,7 +242,7 @@ def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array
 
 def apart(a: Array, b: Array) -> Array:
     """Distances of the joints of hands posed by two sets of angles `(..., 20)`."""
-    return np.linalg.norm(forward_kinematics(a)[0] - forward_kinematics(b)[0], axis=-1)
+    return np.linalg.norm(forward_kinematics(HAND, a)[0] - forward_kinematics(HAND, b)[0], axis=-1)
 
 
 def actor_config(offsets: dict[str, Array] | None = None, hand_scale: float = 1.0) -> ActorConfig:
@@ -261,8 +273,8 @@ def test_hands_of_another_size_do_the_same_in_a_scene_of_that_size(bundle, cube:
     assert np.abs(angles - wanted).max() < 1e-6
 
 
-def test_a_new_offset_takes_the_past_along(bundle, cube: Shape) -> None:
-    """What was heard before is seen as if the offset had been there from the start: nothing jumps."""
+def test_a_new_offset_applies_to_the_past_as_well(bundle, cube: Shape) -> None:
+    """Earlier poses are seen as if the offset had been there from the start, so nothing jumps."""
     offset = pose((0.02, 0.03, -0.01), (0.1, 0.3, -0.2, 0.9))
     actors = {}
     for name, config in (("late", actor_config()), ("always", actor_config({"right_wrist": offset}))):

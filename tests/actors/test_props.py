@@ -1,4 +1,4 @@
-"""Which prop a hand is about: the nearest one, whatever distances it spares itself."""
+"""The choice of a prop is that of the nearest one, although not every distance is computed."""
 
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from manipnet.geometry import Array, invert, quat_normalize, transform
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.tracking.tick import BodyAtTick
+from manipnet.wire import Side
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +20,8 @@ def props(tmp_path_factory: pytest.TempPathFactory) -> list[Prop]:
     return [Prop("a", "cube", cube), Prop("b", "bowl", bowl), Prop("c", "cube", cube, 2.5)]
 
 
-def nearest(side: str, wrist: Array, props: list[Prop], poses: dict[str, Array], current: str | None) -> Prop:
-    """The same by brute force."""
+def nearest(side: Side, wrist: Array, props: list[Prop], poses: dict[str, Array], current: str | None) -> Prop:
+    """The same choice by brute force."""
     palm = transform(wrist, np.array(PALM_M[side]))
     distances = [
         prop.shape.signed_distance(transform(invert(poses[prop.name]), palm)[None] / prop.scale)[0][0] * prop.scale
@@ -31,7 +32,7 @@ def nearest(side: str, wrist: Array, props: list[Prop], poses: dict[str, Array],
 
 
 @pytest.mark.parametrize("current", [None, "a", "c"])
-def test_a_hand_is_about_the_nearest_prop(props: list[Prop], current: str | None) -> None:
+def test_a_hand_belongs_to_the_nearest_prop(props: list[Prop], current: str | None) -> None:
     rng = np.random.default_rng(5)
     for _ in range(60):
         wrist, *poses = np.concatenate([rng.normal(0.0, 0.15, (4, 3)), quat_normalize(rng.normal(size=(4, 4)))], axis=1)

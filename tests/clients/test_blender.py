@@ -15,7 +15,7 @@ from checkout import ROOT, publishing
 from joint_poses import assert_joints
 from manipnet_client import decode
 from manipnet_client.retarget import BONES
-from random_hand import ENDS, posed
+from random_hand import ENDS, HAND, posed
 
 from manipnet import __version__
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate, quat_to_matrix
@@ -52,7 +52,7 @@ def pose_of(position, rotation):
 
 def armature(bpy, rng):
     """Both hands in a T-pose, with Mixamo's bone names and randomly rotated hand and finger bones."""
-    positions, _ = forward_kinematics(np.zeros(20))
+    positions, _ = forward_kinematics(HAND, np.zeros(20))
     bones = []
     for side, sign in (("Left", -1.0), ("Right", 1.0)):
         joints, turn = positions * [sign, 1, 1] + [sign, 0, 0], quat_exp(rng.normal(size=3))

@@ -5,7 +5,7 @@ import pytest
 from languages import run
 from manipnet_client import decode
 from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, matches
-from random_hand import posed
+from random_hand import HAND, posed
 
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity
@@ -18,10 +18,10 @@ def foreign_rig(side, rng, mirrored):
 
     Returns positions, rotations and tips in the space of the hand bone, and the rotation from our wrist frame to it.
     """
-    positions, _ = forward_kinematics(rng.uniform(-0.2, 0.3, 20))
+    positions, _ = forward_kinematics(HAND, rng.uniform(-0.2, 0.3, 20))
     positions = 1.3 * positions
     positions[[5, 8, 14]] = (
-        1.3 * forward_kinematics(np.zeros(20))[0][[5, 8, 14]]
+        1.3 * forward_kinematics(HAND, np.zeros(20))[0][[5, 8, 14]]
     )  # the knuckles define the hand's orientation
     if (side == "left") != mirrored:
         positions = positions * [-1, 1, 1]

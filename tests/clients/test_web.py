@@ -41,7 +41,7 @@ def test_example_page_reconnects_to_a_restarted_server(pages, tmp_path):
 
 
 def test_joint_names_are_webxr_names():
-    from manipnet.synthesis.hand.openxr import WEBXR_JOINT_NAMES
+    from manipnet.wire.hand_names import WEBXR_JOINT_NAMES
 
     text = (CLIENTS / "web" / "layout.js").read_text(encoding="utf-8")
     for name in WEBXR_JOINT_NAMES:

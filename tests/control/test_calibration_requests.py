@@ -1,4 +1,4 @@
-"""Calibrating and placing without a server around: the requests, an actor that was shown the sheet, a rig file."""
+"""The requests calibrate and place_object without a server: on an actor whose hands were shown, and a rig file."""
 
 import threading
 from collections.abc import Iterator
@@ -16,9 +16,11 @@ from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.request import RequestError
 from manipnet.geometry import compose, invert, quat_exp
 from manipnet.runtime.mailbox import Mailbox
-from manipnet.synthesis.hand.skeleton import DOF_COUNT, DOF_LIMITS_RAD
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
+
+HAND = shipped_hand()
 
 RIG = '# mine\n[bodies]\nleft_wrist = "left_wrist"  # taped\nright_wrist = "right_wrist"\n'
 CLUSTER = np.concatenate([[0.03, 0.02, -0.01], quat_exp(np.array([1.0, -2.0, 0.5]))])
@@ -35,7 +37,7 @@ def rig(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def actors_proxy(rig: Path) -> Iterator[ActorsProxy]:
-    bundle = SimpleNamespace(rest_angles=np.zeros(DOF_COUNT), limits=DOF_LIMITS_RAD)
+    bundle = SimpleNamespace(hand=HAND, rest_angles=np.zeros(HAND.angle_count), limits=HAND.limits)
     mailbox, stop = Mailbox(Telemetry()), threading.Event()
 
     def tick() -> None:
@@ -69,8 +71,9 @@ def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(
     answer = calibrate({"op": "calibrate"})
     assert answer["stored"] == str(rig)
     for side in ("left", "right"):
-        part = f"{side}_wrist"
-        for offset in (actors_proxy.actors[0].offset(part), load_rig(rig).actors[0].wrists[part].offset):
+        role = f"{side}_wrist"
+        for offset in (actors_proxy.actors[0].offset(role), load_rig(rig).actors[0].wrists[role].offset):
+            assert offset is not None
             away_m, away_rad = difference(offset, CLUSTER)
             assert away_m < 1e-3
             assert away_rad < np.radians(0.5)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import zmq
 
-from manipnet.config.settings import ConfigError
+from manipnet.common.options import ConfigError
 from manipnet.control.client import ControlClient
 from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.request import Request, RequestError

@@ -1,4 +1,4 @@
-"""The demo: a recording that runs for ever through the server's own socket."""
+"""The demo: a recording that is played again and again through the server's own socket."""
 
 import math
 import queue
@@ -49,7 +49,7 @@ def test_the_performance_ends_as_it_begins() -> None:
         assert abs(np.dot(first.q, last.q)) > math.cos(math.radians(0.5))
 
 
-def test_a_prop_that_lies_still_in_every_loop_is_never_taken_for_frozen() -> None:
+def test_a_prop_that_lies_still_in_every_loop_is_never_rejected_as_frozen() -> None:
     frames, gate = list(read_bodies(DEMO_FILE)), OutlierGate()
     period_s = frames[-1].t_s + frames[1].t_s - 2.0 * frames[0].t_s
     for loop in range(10):
@@ -57,7 +57,7 @@ def test_a_prop_that_lies_still_in_every_loop_is_never_taken_for_frozen() -> Non
             assert gate.check(replace(frame, t_s=frame.t_s + loop * period_s, source="demo"))[1] == []
 
 
-def test_the_server_performs(tiny_bundle: Path) -> None:
+def test_the_server_plays_the_demo(tiny_bundle: Path) -> None:
     with serving("--demo", "--model", str(tiny_bundle)) as server:
         subscriber = Subscriber(server.addresses["hands"])
         messages = [subscriber.next() for _ in range(60)]
@@ -68,7 +68,7 @@ def test_the_server_performs(tiny_bundle: Path) -> None:
         subscriber.close()
 
 
-def test_meshes_may_be_swapped_but_not_invented() -> None:
+def test_meshes_of_the_demos_props_may_be_replaced_and_no_others() -> None:
     swapped = demo_objects((parse_object("cube=duck.ply"),))
     assert [thing.name for thing in swapped] == list(DEMO_OBJECTS)
     assert swapped[0].mesh == Path("duck.ply")

@@ -53,7 +53,7 @@ def _message(bodies: int) -> dict:
 
 
 def _pack(document: Any) -> bytes:
-    return msgpack.packb(document) or b""
+    return msgpack.packb(document)
 
 
 def _bodies(data: bytes) -> object:

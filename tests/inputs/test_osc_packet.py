@@ -52,7 +52,7 @@ def test_what_python_osc_writes_is_read(arguments):
 
 
 def test_bundles_are_read_in_order_with_their_time():
-    builder = OscBundleBuilder(1_000.5)
+    builder = OscBundleBuilder(1_000.5)  # pyright: ignore[reportArgumentType]: the time is a number of seconds
     builder.add_content(message("/one", 1))
     inner = OscBundleBuilder(1)
     inner.add_content(message("/two", 2))

@@ -2,7 +2,7 @@
 
 import queue
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import islice, pairwise
 from pathlib import Path
 
@@ -139,7 +139,7 @@ def test_the_address_to_play_to_is_checked(url: str) -> None:
 def short_take(start_s: float, seconds: float = 1.5, rate_hz: float = 120.0) -> Take:
     time_s = start_s + np.arange(round(seconds * rate_hz) + 1) / rate_hz
     performance = [scene(float(t - start_s)) for t in time_s]
-    tracks: dict[str, Sequence] = {name: [poses[name] for poses in performance] for name in performance[0]}
+    tracks = {name: [poses[name] for poses in performance] for name in performance[0]}
     seen = np.ones(len(time_s), dtype=np.bool_)
     return Take("short", rate_hz, time_s, {name: BodyTrack(np.array(poses), seen) for name, poses in tracks.items()})
 

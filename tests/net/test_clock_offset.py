@@ -26,6 +26,7 @@ def test_the_truth_is_within_the_uncertainty(offset, delays, drift):
         probes.add(sent, read * (1 + drift) + offset, now)
         now += 0.5
     best = probes.best(now)
+    assert best is not None
     truth = now * (1 + drift) + offset - now
     assert abs(best.offset_s - truth) <= best.uncertainty_s + 1e-7 + MAX_DRIFT * max(map(sum, delays))
 
@@ -34,14 +35,18 @@ def test_the_smallest_round_trip_counts():
     probes = ClockProbes()
     for round_trip in (0.1, 0.001, 0.05):
         probes.add(0.0, 5.0, round_trip)
-    assert probes.best(0.1).uncertainty_s == pytest.approx(0.0005, abs=1.1e-5)
+    best = probes.best(0.1)
+    assert best is not None
+    assert best.uncertainty_s == pytest.approx(0.0005, abs=1.1e-5)
 
 
 def test_a_newer_probe_replaces_an_old_one():
     probes = ClockProbes()
     probes.add(0.0, 10.0, 0.001)
     probes.add(100.0, 111.0, 100.004)
-    assert probes.best(100.0).offset_s == pytest.approx(11.0, abs=0.01)
+    best = probes.best(100.0)
+    assert best is not None
+    assert best.offset_s == pytest.approx(11.0, abs=0.01)
 
 
 def test_without_probes_there_is_no_offset():

@@ -63,7 +63,7 @@ def test_the_program_is_bounded():
     assert len(program(many[-MAX_KNOWN:], 0.1)) == 8 * (5 * MAX_KNOWN + 4)
 
 
-class Recorder:
+class Recorder(FloodFilter):
     """Stands in for the kernel and notes the calls."""
 
     def __init__(self):
@@ -72,6 +72,7 @@ class Recorder:
     def engage(self, known, share):
         self.engaged = True
         self.shares.append(share)
+        return True
 
     def release(self):
         self.engaged = False

@@ -9,9 +9,9 @@ import time
 import msgpack
 import pytest
 import zmq
-from conftest import PATIENCE_S
 from osc_writer import bundle, osc
 
+from conftest import PATIENCE_S
 from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.service import Control
 from manipnet.inputs.osc import OSC
@@ -181,7 +181,7 @@ def test_hands_are_published_again_after_the_socket_has_failed(telemetry):
         wait_for(lambda: publisher.send(hands))
         with zmq.Context() as context, context.socket(zmq.SUB) as client:
             client.subscribe(TOPIC_BIN)
-            client.connect(publisher.address)
+            client.connect(str(publisher.address))
             wait_for(lambda: publisher.send(hands) and client.poll(0))
             assert client.recv() == TOPIC_BIN + b"b"
     finally:

@@ -10,7 +10,7 @@ from manipnet.geometry import compose
 from manipnet.outputs.axes import to_unreal
 from manipnet.outputs.declaration import EncodedHands
 from manipnet.outputs.livelink import sender as livelink_json
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 LIVE = messages()["live"]
 

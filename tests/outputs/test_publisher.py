@@ -28,6 +28,7 @@ from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
 from manipnet.outputs.websocket import WebSocketOptions
 from manipnet.outputs.zeromq import ZmqOutputOptions
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
 
@@ -37,7 +38,7 @@ MOST_KEPT_BYTES = 6 << 20
 
 
 def publisher_of(telemetry, keys=None):
-    return Publisher(open_outputs(CONFIG.of, Emission(telemetry, keys=keys)), telemetry)
+    return Publisher(open_outputs(CONFIG.of, Emission(telemetry, shipped_hand(), keys=keys)), telemetry)
 
 
 @pytest.fixture

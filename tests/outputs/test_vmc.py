@@ -1,5 +1,6 @@
 """VMC: bytes against the OSC specification, poses against a T-pose worked out by hand, and an independent reader."""
 
+import io
 import select
 import socket
 import subprocess
@@ -13,29 +14,41 @@ from pythonosc.osc_bundle import OscBundle
 from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_exp, quat_multiply, quat_rotate
 from manipnet.net.osc import osc_message
 from manipnet.outputs.declaration import EncodedHands
-from manipnet.outputs.vmc import sender as vmc
+from manipnet.outputs.vmc.bundle import HandBundle
+from manipnet.outputs.vmc.sender import VmcSender
+from manipnet.outputs.vmc.skeleton import FOREARM_M, VmcSkeleton, bone_names
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import PARENTS
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import HandPose
 
+HAND = shipped_hand()
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 HALF = np.sqrt(0.5)
-PLAIN = np.tile(IDENTITY, (17, 1))
+PLAIN = VmcSkeleton(HAND, rest_pose_correction=False)
+CORRECTED = VmcSkeleton(HAND)
 
 
-def local_rotations(angles, bent=None, by=None):
+def local_rotations(angles, bent=None, by=IDENTITY):
     """Local rotations `(17, 4)` of a right hand at `angles`; the bone `bent` turned by `by` in the wrist frame."""
-    world = matrix_to_quat(forward_kinematics(angles)[1])
+    world = matrix_to_quat(forward_kinematics(HAND, angles)[1])
     if bent is not None:
         world[bent] = quat_multiply(by, world[bent])
     local = world.copy()
-    local[1:] = quat_multiply(quat_conjugate(world[PARENTS[1:17]]), world[1:])
+    local[1:] = quat_multiply(quat_conjugate(world[HAND.parents[1:17]]), world[1:])
     return local
 
 
 def hand(rotations, wrist_q=IDENTITY):
     wrist = np.array([0.0, 1.0, 0.0, *wrist_q])
     return HandPose("live", None, 1.0, np.zeros(20), rotations, wrist, np.tile(wrist, (26, 1)))
+
+
+def poses_by_name(skeleton, side, pose):
+    return dict(zip(bone_names(side), skeleton.bone_poses(side, pose), strict=True))
+
+
+def hand_bundle(side, pose, t_s):
+    return HandBundle(bone_names(side)).filled(t_s, PLAIN.bone_poses(side, pose))
 
 
 def test_bytes_are_those_of_the_osc_specification():
@@ -48,7 +61,7 @@ def test_bytes_are_those_of_the_osc_specification():
 
 
 def test_a_bundle_fits_a_packet_and_has_what_the_specification_asks_for():
-    bundle = vmc.hand_bundle("right", messages()["live"].hands["right"], 1.5, PLAIN)
+    bundle = hand_bundle("right", messages()["live"].hands["right"], 1.5)
     assert len(bundle) + 28 <= 1500
     assert bundle[:16] == b"#bundle\0" + bytes(7) + b"\x01"
     assert bundle[20:40] == b"/VMC/Ext/OK\0,i\0\0" + b"\0\0\0\x01"
@@ -61,15 +74,15 @@ def test_a_bundle_fits_a_packet_and_has_what_the_specification_asks_for():
 
 def test_a_bundle_carries_the_poses_of_its_bones_in_their_order():
     hand = messages()["live"].hands["left"]
-    bundle = OscBundle(vmc.hand_bundle("left", hand, 1.5, PLAIN))
+    bundle = OscBundle(hand_bundle("left", hand, 1.5))
     sent = {m.params[0]: m.params[1:] for m in bundle if m.address == "/VMC/Ext/Bone/Pos"}
-    poses = vmc.bone_poses("left", hand, PLAIN)
+    poses = poses_by_name(PLAIN, "left", hand)
     assert list(sent) == list(poses)
     np.testing.assert_allclose(list(sent.values()), list(poses.values()), atol=1e-6)
 
 
 def test_angle_zero_is_the_t_pose_without_correction():
-    poses = vmc.bone_poses("right", hand(local_rotations(np.zeros(20))), PLAIN)
+    poses = poses_by_name(PLAIN, "right", hand(local_rotations(np.zeros(20))))
     turned = [name for name, pose in poses.items() if abs(pose[3:] @ IDENTITY) < 1 - 1e-6]
     assert turned == ["RightHand"]  # this wrist is not in T-pose
 
@@ -77,8 +90,8 @@ def test_angle_zero_is_the_t_pose_without_correction():
 def test_a_finger_bent_by_a_right_angle():
     """T-pose, palm down, Unity: a right finger points to +x and curls to -y, a left one to -x and curls to -y."""
     bent = local_rotations(np.zeros(20), bent=6, by=quat_exp(np.array([0.0, np.pi / 2, 0.0])))
-    right = vmc.bone_poses("right", hand(bent), PLAIN)
-    left = vmc.bone_poses("left", hand(mirror_quats(bent)), PLAIN)
+    right = poses_by_name(PLAIN, "right", hand(bent))
+    left = poses_by_name(PLAIN, "left", hand(mirror_quats(bent)))
     np.testing.assert_allclose(right["RightIndexIntermediate"][3:], [0, 0, -HALF, HALF], atol=1e-4)
     np.testing.assert_allclose(left["LeftIndexIntermediate"][3:], [0, 0, HALF, HALF], atol=1e-4)
     np.testing.assert_allclose(right["RightIndexProximal"][3:], IDENTITY, atol=1e-4)
@@ -89,19 +102,16 @@ def test_wrists_in_t_pose_do_not_turn_the_hand():
     """A right wrist with fingers to -x, thumb to +z, back up in the project frame is the T-pose itself."""
     t_pose = matrix_to_quat(np.array([[-1.0, 0, 0], [0, 0, 1.0], [0, 1.0, 0]]))
     flat = local_rotations(np.zeros(20))
-    right = vmc.bone_poses("right", hand(flat, t_pose), PLAIN)["RightHand"]
-    left = vmc.bone_poses("left", hand(mirror_quats(flat), mirror_quats(t_pose)), PLAIN)["LeftHand"]
-    np.testing.assert_allclose(right, [vmc.FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
-    np.testing.assert_allclose(left, [-vmc.FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
+    right = poses_by_name(PLAIN, "right", hand(flat, t_pose))["RightHand"]
+    left = poses_by_name(PLAIN, "left", hand(mirror_quats(flat), mirror_quats(t_pose)))["LeftHand"]
+    np.testing.assert_allclose(right, [FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(left, [-FOREARM_M, 0, 0, 0, 0, 0, 1], atol=1e-9)
 
 
 def test_rest_pose_correction_makes_bones_point_where_the_hand_does():
     angles = np.linspace(0.0, 0.9, 20)
-    positions, _ = forward_kinematics(angles)
-    sender = vmc.VmcSender("127.0.0.1", 9)
-    correction = sender._correction
-    sender.close()
-    poses = vmc.bone_poses("right", hand(local_rotations(angles)), correction)
+    positions, _ = forward_kinematics(HAND, angles)
+    poses = poses_by_name(CORRECTED, "right", hand(local_rotations(angles)))
     for finger, joints in (("Thumb", (2, 3, 4, 17)), ("Little", (14, 15, 16, 21))):
         turn = IDENTITY
         straight = [HALF, 0.0, HALF] if finger == "Thumb" else [1.0, 0.0, 0.0]  # Unity: thumbs 45 degrees to the front
@@ -117,7 +127,8 @@ def test_read_by_an_independent_osc_tool():
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     process = subprocess.Popen([oscdump, "-L", str(port)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    sender, message = vmc.VmcSender("127.0.0.1", port), messages()["live"]
+    assert isinstance(process.stdout, io.BufferedReader)
+    sender, message = VmcSender("127.0.0.1", port, HAND), messages()["live"]
     try:
         text, give_up = b"", time.monotonic() + 20
         while text.count(b"/VMC/Ext/Bone/Pos") < 32 and time.monotonic() < give_up:
@@ -130,7 +141,7 @@ def test_read_by_an_independent_osc_tool():
         process.stdout.close()
         sender.close()
     lines = [line.split() for line in text.decode().splitlines()]
-    expected = vmc.bone_poses("right", message.hands["right"], vmc._rest_pose_correction())["RightIndexProximal"]
+    expected = poses_by_name(CORRECTED, "right", message.hands["right"])["RightIndexProximal"]
     row = next(line for line in lines if '"RightIndexProximal"' in line)
     assert row[1:3] == ["/VMC/Ext/Bone/Pos", "sfffffff"]
     np.testing.assert_allclose([float(x) for x in row[4:]], expected, atol=1e-5)

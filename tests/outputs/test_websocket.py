@@ -6,6 +6,7 @@ from contextlib import ExitStack
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from manipnet.net.half_open import MOST_HALF_OPEN
 from manipnet.outputs.websocket.server import MAX_CLIENTS, MAX_REQUESTS, WebSocketPublisher
@@ -51,7 +52,7 @@ def test_a_slow_client_gets_the_newest(publisher):
             publisher.publish(i.to_bytes(4, "big") * 1000)
         seen = []
         while not seen or seen[-1] < 2999:
-            payload = connection.recv(timeout=10)
+            payload = connection.recv(timeout=10, decode=False)
             if payload != b"start":
                 seen.append(int.from_bytes(payload[:4], "big"))
     assert seen == sorted(set(seen))
@@ -73,7 +74,7 @@ def test_other_pages_may_not(publisher, origin):
 def test_a_refused_page_leaves_one_line_in_the_log(publisher, caplog):
     for _ in range(2):  # the line of the first one is written when the second one is answered
         with pytest.raises(InvalidStatus, match="403"):
-            connect(publisher.address, origin="https://example.com")
+            connect(publisher.address, origin=Origin("https://example.com"))
     record = next(record for record in caplog.records if record.name.startswith("manipnet"))
     assert record.getMessage() == "refused a connection: invalid Origin header: https://example.com"
     assert record.exc_info is None
@@ -123,6 +124,7 @@ def test_close_twice_and_publish_after():
     publisher.close()
     publisher.close()
     publisher.publish(b"nobody hears this")
+    assert publisher.address is not None
     host, port = publisher.address.removeprefix("ws://").split(":")
     with pytest.raises(OSError):
         socket.create_connection((host, int(port)), 5)

@@ -1,5 +1,6 @@
 """Documents lead somewhere: every relative link of every Markdown file names a file, and an anchor that is there."""
 
+import ast
 import re
 import subprocess
 from pathlib import Path
@@ -34,3 +35,36 @@ def test_every_link_leads_somewhere(path: str) -> None:
 
 def test_the_readme_stays_short() -> None:
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) < README_LINES
+
+
+def texts() -> str:
+    """Every piece of text in the programs, one to a line."""
+    paths = [path for folder in ("server", "tools") for path in (ROOT / folder).rglob("*.py")]
+    nodes = (node for path in paths for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    return "\n".join(node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str))
+
+
+def test_troubleshooting_quotes_what_the_programs_say() -> None:
+    page, said = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8"), texts()
+    cells = re.findall(r"^\| ([^|]*`[^|]*) \|", page, re.M)
+    quoted = [piece.strip() for cell in cells for code in re.findall(r"`([^`]*)`", cell) for piece in code.split("…")]
+    assert [piece for piece in quoted if piece not in said] == []
+
+
+@pytest.mark.parametrize(
+    "path", ["CONTRIBUTING.md", "README.md", "RELEASING.md", "docs/architecture.md", "clients/README.md"]
+)
+def test_files_that_documents_name_are_there(path: str) -> None:
+    named = re.findall(
+        r"`((?:server|tools|tests|clients|docs|examples|benchmarks|models)/[\w./-]+)`",
+        (ROOT / path).read_text(encoding="utf-8"),
+    )
+    assert [name for name in named if not (ROOT / name).exists() and "NAME" not in name] == []
+
+
+def test_the_architecture_names_modules_that_are_there() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?!server/|tools/|tests/)[a-z_]+/[a-z_/]+)(?:\.py)?`", page)
+    folder = ROOT / "server" / "manipnet"
+    assert len(named) > 20
+    assert [name for name in named if not (folder / name).is_dir() and not (folder / f"{name}.py").is_file()] == []

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_server import scene
+from tracked_bodies import frame as body_frame
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
@@ -19,13 +20,13 @@ from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.tick_loop import TickLoop
-from manipnet.synthesis.hand.surface import SENSOR_BONES, SENSOR_POINTS, SENSOR_WEIGHTS
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.sensing.ambient import CENTER_M
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.telemetry import Telemetry
-from manipnet.wire.bodies import BodyFrame, BodySample
+
+HAND = shipped_hand()
 
 HAND_SIZE, PROP_SIZE = 0.9, 1.3
 
@@ -58,8 +59,7 @@ def frames(prop: Prop, tiny_bundle: Path, tmp_path_factory: pytest.TempPathFacto
     rest = lambda message: None, mailbox, recorder, telemetry, observer
     loop = TickLoop("session", [actor], Synthesizer(bundle), *rest)
     for k in range(180):
-        bodies = (BodySample(None, str(n), tuple(p[:3]), tuple(p[3:]), True) for n, p in scene(k / 120).items() if p)
-        mailbox.put(BodyFrame(k / 120, k, tuple(bodies), k / 120, "zmq:test"))
+        mailbox.put(body_frame(k / 120, scene(k / 120), k))
         loop.take_in(0.0)
         while loop.step(k / 120):
             pass
@@ -70,7 +70,7 @@ def frames(prop: Prop, tiny_bundle: Path, tmp_path_factory: pytest.TempPathFacto
 def test_layers_are_where_the_hand_of_their_tick_is(frames: list[Frame], prop: Prop, side) -> None:
     mesh = prop.shape.mesh
     view = ShapeView(prop.object, prop.shape.content_hash, mesh.vertices, mesh.faces)
-    senser = Senser()
+    senser = Senser(HAND)
     for frame in frames:
         hand, senses = frame.message.hands[side], senser.sense(frame, side, view, PROP_SIZE)
         sensors = place_sensors(side, hand.angles, hand.wrist)
@@ -78,10 +78,10 @@ def test_layers_are_where_the_hand_of_their_tick_is(frames: list[Frame], prop: P
         np.testing.assert_allclose(points, sensors, atol=1e-6)
         np.testing.assert_allclose(senses.wrist, hand.wrist)
         np.testing.assert_allclose(senses.raw[0], 0.0, atol=1e-9)
-        joints = world_bones(side, HAND_SIZE, hand.angles, hand.wrist)[0]
+        joints = world_bones(HAND, side, HAND_SIZE, hand.angles, hand.wrist)[0]
         assert np.linalg.norm(targets - joints, axis=1).max() < 0.25
         assert np.linalg.norm(senses.cells.mean(axis=0)) == pytest.approx(
-            HAND_SIZE * np.linalg.norm(CENTER_M), abs=1e-9
+            HAND_SIZE * np.linalg.norm(HAND.sensors.grid_center), abs=1e-9
         )
         T_object_world = invert(next(body.pose for body in frame.message.bodies if body.name == "Box"))
         hits = np.abs(senses.readings) < 0.9 * HAND_SIZE * SENSOR_RANGE_M
@@ -95,6 +95,6 @@ def test_layers_are_where_the_hand_of_their_tick_is(frames: list[Frame], prop: P
 def place_sensors(side, angles, wrist):
     """The skin's sensors on the shown bones `(104, 3)`, in the world."""
     mirrored = mirror_points if side == "left" else np.asarray
-    positions, quats = world_bones(side, HAND_SIZE, angles, wrist)
-    turned = np.einsum("sbij,sbj->sbi", quat_to_matrix(quats)[SENSOR_BONES], mirrored(SENSOR_POINTS))
-    return (SENSOR_WEIGHTS[..., None] * (positions[SENSOR_BONES] + HAND_SIZE * turned)).sum(axis=1)
+    positions, quats = world_bones(HAND, side, HAND_SIZE, angles, wrist)
+    turned = np.einsum("sbij,sbj->sbi", quat_to_matrix(quats)[HAND.sensors.bones], mirrored(HAND.sensors.points))
+    return (HAND.sensors.weights[..., None] * (positions[HAND.sensors.bones] + HAND_SIZE * turned)).sum(axis=1)

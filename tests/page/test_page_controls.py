@@ -14,10 +14,9 @@ from browser import Page, browsing
 from live_server import LiveServer, Sender, Subscriber, serving
 
 from manipnet.actors.calibration import difference, sheet_at, wrist_on_sheet
-from manipnet.geometry import compose, invert, quat_exp
+from manipnet.geometry import Side, compose, invert, quat_exp
 from manipnet.page.overlays import OVERLAYS
 from manipnet.recording.mcap_file import read_hands
-from manipnet.synthesis.synthesizer import Side
 from manipnet.wire import HandsMessage
 
 PATIENCE_S = 240.0
@@ -114,7 +113,7 @@ def test_pause_go_on_and_rest(studio: Studio) -> None:
     studio.page.click("Pause")
     studio.until(are("hold"))
     studio.says("Paused")
-    studio.page.click("Go on", PATIENCE_S)
+    studio.page.click("Resume", PATIENCE_S)
     studio.until(are("live"))
     studio.page.click("Rest")
     studio.until(are("rest"))
@@ -140,16 +139,16 @@ def test_an_object_is_chosen_sized_and_placed(studio: Studio) -> None:
 
     studio.page.click("Objects")
     studio.page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'Box')", PATIENCE_S)
-    studio.page.choose("Carries", "sphere")
+    studio.page.choose("Object", "sphere")
     studio.until(lambda _: box()["object"] == "sphere")
     studio.page.type("Size", "1.5")
     studio.until(lambda _: box()["scale"] == 1.5)
-    studio.page.type("Moved, mm", "40", number=1)
+    studio.page.type("Position, mm", "40", number=1)
     moved = studio.until(lambda message: pose_of(message, "Box")[1] > BOX[1] + 0.03)
     np.testing.assert_allclose(pose_of(moved, "Box")[:3], BOX[:3] + np.array([0.0, 0.04, 0.0]), atol=1e-9)
-    studio.page.type("Turned, °", "90", number=1)
+    studio.page.type("Rotation, °", "90", number=1)
     studio.until(lambda message: abs(pose_of(message, "Box")[4]) > 0.7)
-    studio.page.tick("By hand")
+    studio.page.tick("Drag to move")
     (kept,) = tomllib.loads(studio.rig.read_text())["objects"]
     np.testing.assert_allclose(kept["position"], [0.0, 0.04, 0.0])
     studio.page.click("It stands on the sheet")
@@ -166,18 +165,18 @@ def test_a_take_is_recorded_shown_scrubbed_and_left_again(studio: Studio) -> Non
     assert sum(1 for _ in read_hands(take)) > 0
     studio.page.click("Show this take")
     studio.says(f"▶ {take.name}")
-    studio.page.type("Second", "0.02")
+    studio.page.type("Time, s", "0.02")
     studio.page.click("Play")
-    studio.page.click("Hold", PATIENCE_S)
+    studio.page.click("Pause playback", PATIENCE_S)
     studio.page.click("Back to live")
     studio.says("● Live")
 
 
 def test_wrists_are_calibrated_and_the_quality_is_told(studio: Studio) -> None:
     studio.page.click("Calibrate")
-    studio.page.click("Hands are on the marks")
-    studio.says("Good: hands 1.000 times")
-    studio.says("kept in stage.toml")
+    studio.page.click("The hands are on the marks")
+    studio.says("Good: the hands are 1.000 times")
+    studio.says("stored in stage.toml")
     studio.until(lambda message: all(is_there(message, side) for side in WRISTS))  # eased there, not at once
     kept = tomllib.loads(studio.rig.read_text())["bodies"]["left_wrist"]
     found = np.array([*kept["position"], *kept["rotation"]])

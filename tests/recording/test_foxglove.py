@@ -1,4 +1,4 @@
-"""Recordings open in Foxglove: every message against the JSON schema Foxglove publishes, by another's validator."""
+"""Recordings open in Foxglove: a third-party validator checks every message against Foxglove's JSON schemas."""
 
 import json
 from pathlib import Path
@@ -27,7 +27,7 @@ console.log(JSON.stringify({wrong, count: messages.length, published: FrameTrans
 
 
 def bare(schema: Any) -> Any:
-    """A schema without what only people read."""
+    """A schema without the parts that only people read."""
     if isinstance(schema, list):
         return [bare(item) for item in schema]
     if not isinstance(schema, dict):

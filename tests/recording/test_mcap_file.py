@@ -110,7 +110,7 @@ def test_a_cut_off_file_opens_and_is_recovered(tmp_path: Path, share: float) -> 
     assert list(read_bodies(tmp_path / "mended.mcap"))[-1].t_s == frames[-1].t_s
 
 
-def test_damage_in_the_middle_costs_a_chunk(tmp_path: Path) -> None:
+def test_damage_in_the_middle_costs_one_chunk(tmp_path: Path) -> None:
     path = write(tmp_path / "take.mcap")
     content = bytearray(path.read_bytes())
     middle = len(content) // 2
@@ -123,10 +123,10 @@ def test_damage_in_the_middle_costs_a_chunk(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"not a recording", b"\x89MCAP0\r\n"])
-def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_not_a_recording_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "take.mcap"
     path.write_bytes(content)
-    with pytest.raises(RecordingError, match="is no recording"):
+    with pytest.raises(RecordingError, match="not a recording"):
         list(read_bodies(path))
     with pytest.raises(RecordingError, match=r"missing\.mcap: cannot be read"):
         read_about(tmp_path / "missing.mcap")

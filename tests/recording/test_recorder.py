@@ -1,4 +1,4 @@
-"""Takes recorded on request, beside a session that goes on."""
+"""Takes that are recorded on request while the session goes on."""
 
 import signal
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ def test_a_take_holds_what_was_published_from_record_to_stop(stage: Stage, takes
     assert stage.server.ask({"op": "recordings"})["recording"] is None
     begun = stage.server.ask({"op": "record", "name": "first"})
     assert begun == {"name": "first.mcap", "folder": str(takes.resolve())}
-    published = stage.perform(1.0, scene)[:-1]  # the last may be on its way to the recorder still
+    published = stage.perform(1.0, scene)[:-1]  # the last may still be on its way to the recorder
     assert stage.server.ask({"op": "recordings"})["recording"]["name"] == "first.mcap"
     ended = stage.server.ask({"op": "stop_recording"})
     recorded = list(read_hands(takes / "first.mcap"))
@@ -47,7 +47,7 @@ def test_a_take_holds_what_was_published_from_record_to_stop(stage: Stage, takes
     assert stage.counted("recorded", "lost") == 0
 
 
-def test_what_cannot_be_recorded_is_said(stage: Stage, takes: Path) -> None:
+def test_a_recording_that_cannot_begin_is_refused_with_the_reason(stage: Stage, takes: Path) -> None:
     assert "nothing is being recorded" in stage.server.ask({"op": "stop_recording"})["error"]
     for name in ("../elsewhere", "", "a/b", 7, "x" * 65):
         assert "letters, digits" in stage.server.ask({"op": "record", "name": name})["error"]

@@ -1,4 +1,4 @@
-"""Frames that are lost, late, out of order and doubled, by a clock that a test steps: every tick, and no jump.
+"""Frames that are lost, late, out of order and duplicated, by a clock that the test steps: no tick is missing, no jump.
 
 The same links with real sockets, servers and time are measured by `python -m benchmarks.reliability.lossy_link`.
 """
@@ -26,7 +26,7 @@ BAD = LinkQuality(loss=0.05, delay_s=0.08, jitter_s=0.02, reorder=0.25, duplicat
 WORSE = LinkQuality(loss=0.1, delay_s=0.3, jitter_s=0.1, reorder=0.25, duplicate=0.05)
 
 Arrive = Callable[[float], list[float]]
-"""From when a frame was sent to when it arrives: never, once, or twice."""
+"""From the time a frame was sent to the times it arrives: none, one or two."""
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def bundle(tiny_bundle: Path) -> Bundle:
 
 @pytest.fixture
 def receive(bundle: Bundle, tmp_path: Path):
-    """Plays the scene over a network; the messages of the settled part."""
+    """Play the scene over a network; returns the messages of the settled part."""
     shape = ObjectCatalog().shape("cube")
 
     def run(arrive: Arrive, look_ahead_s: float) -> list[HandsMessage]:
@@ -64,12 +64,12 @@ def over(weather: LinkQuality) -> Arrive:
 
 
 def stalled(begin_s: float, length_s: float) -> Arrive:
-    """Everything that would arrive in between arrives at its end."""
+    """A network that stalls: what would arrive during the stall arrives at its end."""
     return lambda t_s: [begin_s + length_s if begin_s <= t_s < begin_s + length_s else t_s]
 
 
 def largest_steps(messages: list[HandsMessage]) -> tuple[float, float]:
-    """Of any finger's angle, radians, and of a wrist, metres, from one message to the next."""
+    """The largest step from one message to the next of any finger's angle, radians, and of a wrist, metres."""
     turns, ways = [], []
     for a, b in pairwise(messages):
         for side, hand in b.hands.items():
@@ -97,7 +97,7 @@ def test_every_tick_comes_out_of_a_bad_network_without_a_jump(
 
 
 @pytest.mark.parametrize(("look_ahead_s", "stall_s"), [(0.0, 0.07), (0.0, 0.1), (0.1, 0.15), (0.1, 0.2)])
-def test_a_wrist_that_stood_for_want_of_frames_glides_to_where_it_is(
+def test_a_wrist_that_stood_still_for_lack_of_frames_glides_to_where_it_is(
     receive, look_ahead_s: float, stall_s: float
 ) -> None:
     clean, messages = receive(stalled(0.0, 0.0), look_ahead_s), receive(stalled(2.1, stall_s), look_ahead_s)

@@ -1,4 +1,4 @@
-"""Objects from files: a folder of the user's own, files that change while a session runs, swaps between two ticks."""
+"""Objects from files: the user's folder, files that change while a session runs, and swaps between two ticks."""
 
 import os
 import threading
@@ -61,7 +61,7 @@ def test_a_folder_adds_to_the_library_and_comes_before_it(folder: Path) -> None:
     box(folder / "crate.stl", 7.0)
     box(folder / "cube.obj", 9.0)
     (folder / "notes.txt").write_text("no mesh")
-    assert set(catalog.names()) == LIBRARY | {"crate"}, "without being told"
+    assert set(catalog.names()) == LIBRARY | {"crate"}, "the folder is read again"
     assert size_of(catalog.shape("crate")) == pytest.approx(0.07, abs=1e-6)
     assert size_of(catalog.shape("cube")) == pytest.approx(0.09, abs=1e-6)
     assert catalog.shape("crate") is catalog.shape("crate"), "built once"
@@ -75,33 +75,33 @@ def test_a_rigs_mesh_comes_before_the_folders(folder: Path, tmp_path: Path) -> N
     catalog = ObjectCatalog(folder)
     shape = catalog.load(tmp_path / "crate.stl")
     assert catalog.shape("crate") is shape
-    assert catalog.add(folder / "crate.stl") is catalog.shape("crate"), "what is brought in comes first"
+    assert catalog.add(folder / "crate.stl") is catalog.shape("crate"), "an added file comes first"
 
 
-def test_a_changed_file_is_built_again_once_nobody_writes_it_any_more(folder: Path) -> None:
+def test_a_changed_file_is_built_again_once_nobody_is_writing_it(folder: Path) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
     catalog = ObjectCatalog(folder)
     old = catalog.shape("crate")
     assert catalog.changed() == []
     box(path, 0.06)
-    assert catalog.changed() == [], "it may still be being written"
+    assert catalog.changed() == [], "somebody may still be writing it"
     box(path, 0.07)
-    assert catalog.changed() == [], "it was"
+    assert catalog.changed() == [], "somebody was still writing it"
     ((before, after),) = catalog.changed()
     assert before is old
     assert size_of(after) == pytest.approx(0.07, abs=1e-6)
     assert catalog.shape("crate") is after
     assert catalog.changed() == []
     path.touch()
-    assert (catalog.changed(), catalog.changed()) == ([], []), "the same content is no change"
+    assert (catalog.changed(), catalog.changed()) == ([], []), "the same content is not a change"
     path.unlink()
     assert (catalog.changed(), catalog.changed()) == ([], [])
     assert "crate" not in catalog.names()
 
 
 @pytest.mark.parametrize("content", [b"", b"ply\nnonsense", b"solid x\nendsolid x\n"])
-def test_a_file_that_breaks_is_named_and_the_shape_stays(folder: Path, content: bytes, caplog) -> None:
+def test_a_file_that_becomes_invalid_is_named_and_its_shape_stays(folder: Path, content: bytes, caplog) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
     catalog = ObjectCatalog(folder)
@@ -153,7 +153,7 @@ def test_a_large_file_is_prepared_by_another_process(folder: Path, monkeypatch: 
         make_shape(path, "m", 1.0)
 
 
-# --- what a hand makes of it
+# --- hands at objects that change
 
 
 @pytest.fixture(scope="module")
@@ -188,6 +188,7 @@ class Scene:
         return {side: hand.prop for side, hand in self.actor.hands.items()}
 
 
+@pytest.mark.slow
 def test_two_objects_one_in_each_hand_at_the_same_time(bundle: Bundle) -> None:
     catalog = ObjectCatalog()
     scene = Scene(bundle, catalog)
@@ -214,7 +215,7 @@ def test_a_hand_turns_to_another_object_only_when_it_is_clearly_nearer(bundle: B
         assert scene.held()["right"] == "pot"
 
 
-def test_a_swapped_or_changed_shape_is_in_the_very_next_tick(bundle: Bundle, folder: Path) -> None:
+def test_the_next_tick_uses_a_swapped_or_changed_shape(bundle: Bundle, folder: Path) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
     catalog = ObjectCatalog(folder)
@@ -233,7 +234,7 @@ def test_a_swapped_or_changed_shape_is_in_the_very_next_tick(bundle: Bundle, fol
 
 
 def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> None:
-    """No tick waits for a builder: it asks for nothing that a builder holds."""
+    """A tick never waits for a builder, because it needs no lock that a builder holds."""
     box(folder / "crate.ply", 0.05)
     begun, finish = threading.Event(), threading.Event()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_server import scene
+from tracked_bodies import frame
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
@@ -20,7 +21,6 @@ from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 from manipnet.synthesis.synthesizer import HandStep, Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.wire import HandsMessage, encode_msgpack
-from manipnet.wire.bodies import BodyFrame, BodySample
 
 HERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -36,7 +36,7 @@ def catalog() -> ObjectCatalog:
 
 
 class Bench:
-    """A loop whose time is the frames' own, and what it publishes."""
+    """A loop whose clock is the frames' time, and the messages that it publishes."""
 
     def __init__(
         self, bundle: Bundle, folder: Path, actors: list[Actor], telemetry: Telemetry, synthesizer=None
@@ -69,22 +69,8 @@ class Bench:
     def _publish(self, message: HandsMessage) -> None:
         if self.is_broken:
             raise OSError("the cable is out")
-        encode_msgpack(message)  # which refuses what must not leave
+        encode_msgpack(message)  # raises for a message that must not leave
         self.messages.append(message)
-
-
-def frame(t_s: float, poses) -> BodyFrame:
-    bodies = tuple(
-        BodySample(
-            key if isinstance(key, int) else None,
-            key if isinstance(key, str) else None,
-            tuple((pose or HERE)[:3]),
-            tuple((pose or HERE)[3:]),
-            pose is not None,
-        )
-        for key, pose in poses.items()
-    )
-    return BodyFrame(t_s, None, bodies, t_s, "zmq:bench")
 
 
 def actor(bundle: Bundle, catalog: ObjectCatalog, telemetry: Telemetry, *props: Prop, config=None) -> Actor:
@@ -102,7 +88,7 @@ def bench(bundle: Bundle, catalog: ObjectCatalog, tmp_path: Path):
     )
 
 
-def test_each_hand_takes_the_prop_that_is_nearest_and_does_not_waver(bundle, catalog, tmp_path) -> None:
+def test_each_hand_takes_the_nearest_prop_and_stays_with_it(bundle, catalog, tmp_path) -> None:
     telemetry = Telemetry()
     props = [Prop(name, "cube", catalog.shape("cube")) for name in ("cup", "pot")]
     bench = Bench(bundle, tmp_path, [actor(bundle, catalog, telemetry, *props)], telemetry)
@@ -121,7 +107,7 @@ def test_each_hand_takes_the_prop_that_is_nearest_and_does_not_waver(bundle, cat
     assert len({message.hands["left"].object for message in messages}) == 1
 
 
-def test_two_actors_are_told_apart_and_share_one_stream(bundle, catalog, tmp_path) -> None:
+def test_two_actors_share_one_stream(bundle, catalog, tmp_path) -> None:
     telemetry = Telemetry()
     ann = ActorConfig("ann", {"left_wrist": BodyConfig(1), "right_wrist": BodyConfig("2")})
     bob = ActorConfig("bob", {"right_wrist": BodyConfig("bob")}, hand_scale=0.8)
@@ -155,7 +141,7 @@ def test_two_actors_are_told_apart_and_share_one_stream(bundle, catalog, tmp_pat
     assert knuckles == pytest.approx(0.8 * np.linalg.norm(anns.joints[12, :3] - anns.joints[1, :3]))
 
 
-def test_a_body_with_an_offset_is_where_the_offset_says(bundle, catalog, tmp_path) -> None:
+def test_a_wrist_sits_on_its_body_at_its_offset(bundle, catalog, tmp_path) -> None:
     turn = quat_exp(np.array([0.0, np.pi / 2, 0.0]))
     config = ActorConfig("a", {"right_wrist": BodyConfig(3, np.array([0.0, 0.0, 0.1, *turn]))})
     telemetry = Telemetry()
@@ -165,7 +151,7 @@ def test_a_body_with_an_offset_is_where_the_offset_says(bundle, catalog, tmp_pat
 
 
 class Faulty:
-    """A synthesizer that breaks at chosen calls, by raising or by returning NaN."""
+    """A synthesizer that fails at chosen calls, by an exception or by NaN."""
 
     def __init__(self, bundle: Bundle, breaks, how: str) -> None:
         self._inner, self._breaks, self._how, self.calls = Synthesizer(bundle), breaks, how, 0
@@ -182,7 +168,7 @@ class Faulty:
 
 
 @pytest.mark.parametrize("how", ["raise", "nan"])
-def test_an_internal_error_shows_the_last_good_pose_leaves_a_dump_and_goes_on(
+def test_after_an_internal_error_the_last_good_pose_stays_a_dump_is_written_and_the_ticks_go_on(
     bundle, catalog, tmp_path: Path, how: str
 ) -> None:
     telemetry = Telemetry()
@@ -215,7 +201,7 @@ def test_an_error_in_one_actors_plan_holds_that_actor_only(bench: Bench, monkeyp
     assert bench.telemetry.counts()["tick_errors"]["plan"] == len(held)
 
 
-def test_a_message_that_cannot_be_published_is_counted_and_the_next_one_goes_out(bench: Bench) -> None:
+def test_a_message_that_cannot_be_published_is_counted_and_later_ones_go_out(bench: Bench) -> None:
     before = bench.play(0.6)
     bench.is_broken = True
     assert bench.play(0.2, start_s=0.6) == []

@@ -1,4 +1,4 @@
-"""Requests to a real server: every operation, and everything that is none."""
+"""Requests to a real server: every operation, and everything that is not one."""
 
 import base64
 import json
@@ -11,10 +11,9 @@ import zmq
 from live_server import Stage, scene
 
 from manipnet.net.clock_offset import measure_offset
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
-from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.synthesis.objects.library import library_names, load_library_mesh
 from manipnet.telemetry import CONTROL_OPS
+from manipnet.wire.hand_names import ANGLE_NAMES, JOINT_NAMES, OPENXR_JOINT_NAMES
 
 OPS = ", ".join(op for op in CONTROL_OPS if op != "invalid")
 
@@ -24,7 +23,7 @@ def test_hello_says_what_a_client_must_know(stage: Stage, as_json: bool) -> None
     hello = stage.server.ask({"op": "hello"}, as_json)
     assert hello["schema"] == 1
     assert hello["joint_names"] == list(JOINT_NAMES)
-    assert hello["angle_names"] == list(DOF_NAMES)
+    assert hello["angle_names"] == list(ANGLE_NAMES)
     assert hello["openxr_joint_names"] == list(OPENXR_JOINT_NAMES)
     assert hello["actors"] == ["actor"]
     assert set(library_names()) <= set(hello["objects"])
@@ -43,7 +42,7 @@ def test_the_clock_is_measured_by_ping_and_published_with_its_uncertainty(stage:
         req.connect(stage.server.addresses["control"])
 
         def ping(**report: float | str) -> float:
-            req.send(msgpack.packb({"op": "ping", **report}) or b"")
+            req.send(msgpack.packb({"op": "ping", **report}))
             return msgpack.unpackb(req.recv())["t"]
 
         server = measure_offset(ping, lambda: time.monotonic() + ahead_s)
@@ -80,7 +79,7 @@ def test_status_tells_the_health_of_every_body_and_hand(stage: Stage) -> None:
     assert 0.0 < status["delay_ms"]["p50"] <= status["delay_ms"]["max"]
 
 
-def test_the_mesh_that_a_body_carries_can_be_had(stage: Stage) -> None:
+def test_a_client_receives_the_mesh_that_a_body_carries(stage: Stage) -> None:
     stage.server.ask({"op": "select_object", "body": "Box", "object": "cube", "scale": 0.5})
     answer = stage.server.ask({"op": "mesh", "body": "Box"}, as_json=True)
     assert (answer["object"], answer["scale"]) == ("cube", 0.5)
@@ -111,14 +110,14 @@ def test_an_object_is_swapped_while_the_hands_are_on_it(stage: Stage) -> None:
     messages = stage.perform(1.0, poses)
     first_shown = swapped.pop("seq")
     assert swapped == {"actor": "actor", "body": "Box", "object": "sphere", "scale": 0.8}
-    assert messages[0].seq - 1 <= first_shown < messages[-1].seq, "the tick in the making may be the one before"
+    assert messages[0].seq - 1 <= first_shown < messages[-1].seq, "the tick that was being made may be the one before"
     assert len(messages) == 61
     assert {hand.object for m in messages for hand in m.hands.values()} == {"Box"}
     assert carried(stage) == ("sphere", 0.8)
     stage.server.ask({"op": "select_object", "body": "Box", "object": "cube"})
 
 
-def test_a_body_nobody_named_may_be_given_an_object(stage: Stage) -> None:
+def test_a_body_that_the_rig_does_not_name_may_carry_an_object(stage: Stage) -> None:
     stage.server.ask({"op": "select_object", "body": 42, "object": "sphere"})
     poses = lambda t: {k: v for k, v in scene(t).items() if k != "Box"} | {42: scene(t)["Box"]}  # noqa: E731
     assert stage.perform(0.4, poses)[-1].hands["left"].object == "42"
@@ -163,7 +162,9 @@ BAD = [
 
 @pytest.mark.parametrize(("request_", "complaint"), BAD, ids=[str(i) for i in range(len(BAD))])
 @pytest.mark.parametrize("as_json", [True, False])
-def test_a_wrong_request_is_told_what_is_allowed(stage: Stage, request_: dict, complaint: str, as_json: bool) -> None:
+def test_the_answer_to_a_wrong_request_tells_what_is_allowed(
+    stage: Stage, request_: dict, complaint: str, as_json: bool
+) -> None:
     answer = stage.server.ask(request_, as_json)
     assert set(answer) == {"error"}
     assert complaint in answer["error"]

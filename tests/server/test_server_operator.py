@@ -1,4 +1,4 @@
-"""What an operator asks for beside the rig: pause, and a mesh more to choose from."""
+"""The requests of an operator: pause, and a mesh to add."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from live_server import Stage, own_address, scene, serving
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 
 
-def test_paused_hands_stay_where_they_are_and_then_go_on(stage: Stage) -> None:
+def test_paused_hands_stay_where_they_are_until_the_pause_ends(stage: Stage) -> None:
     def poses(t_s: float):
         if t_s in (1.0, 2.5):
             assert stage.server.ask({"op": "pause", "on": t_s == 1.0})["paused"] == (t_s == 1.0)
@@ -24,7 +24,7 @@ def test_paused_hands_stay_where_they_are_and_then_go_on(stage: Stage) -> None:
     assert "on is 3; allowed are true and false" in stage.server.ask({"op": "pause", "on": 3})["error"]
 
 
-def test_a_mesh_is_brought_in_and_selected(stage: Stage, tmp_path: Path) -> None:
+def test_a_mesh_is_added_and_selected(stage: Stage, tmp_path: Path) -> None:
     path = tmp_path / "club.ply"
     path.write_bytes((LIBRARY_FOLDER / "hammer.ply").read_bytes())
     assert stage.server.ask({"op": "add_object", "file": str(path)}) == {"object": "club"}
@@ -42,22 +42,22 @@ def test_a_mesh_is_brought_in_and_selected(stage: Stage, tmp_path: Path) -> None
         ({"file": str(LIBRARY_FOLDER / "cube.ply"), "unit": "mm"}, "cube.ply: "),
     ],
 )
-def test_what_is_no_mesh_is_said(stage: Stage, more: dict, complaint: str) -> None:
+def test_a_file_that_is_not_a_mesh_is_refused_with_the_reason(stage: Stage, more: dict, complaint: str) -> None:
     assert complaint in stage.server.ask({"op": "add_object"} | more)["error"]
 
 
-def test_another_machine_may_not_have_files_opened_here(tiny_bundle: Path, tmp_path: Path) -> None:
+def test_a_client_on_another_machine_may_not_let_the_server_open_files(tiny_bundle: Path, tmp_path: Path) -> None:
     if (address := own_address()) is None:
         pytest.skip("this machine has no address but its loopback")
     path = tmp_path / "club.ply"
     path.write_bytes((LIBRARY_FOLDER / "hammer.ply").read_bytes())
     with serving("--model", str(tiny_bundle), "--host", "0.0.0.0", "--insecure") as server:
-        asked = {"op": "add_object", "file": str(path)}
+        request = {"op": "add_object", "file": str(path)}
         port = server.addresses["control"].rpartition(":")[2]
         server.addresses["control"] = f"tcp://{address}:{port}"
-        said = [server.ask(asked | {"file": file})["error"] for file in (str(path), "/nowhere.obj")]
-        assert said[0] == said[1], "it does not tell what is there"
-        assert "only a client on that machine may ask; put the mesh into" in said[0]
+        refusals = [server.ask(request | {"file": file})["error"] for file in (str(path), "/nowhere.obj")]
+        assert refusals[0] == refusals[1], "the answer does not tell which files exist"
+        assert "only a client on that machine may ask; put the mesh into" in refusals[0]
         assert "club" not in server.ask({"op": "objects"})["objects"]
         server.addresses["control"] = f"tcp://127.0.0.1:{port}"
-        assert server.ask(asked) == {"object": "club"}
+        assert server.ask(request) == {"object": "club"}

@@ -1,4 +1,4 @@
-"""Calibrating and placing on a real server: in force at once, kept in its rig file, refused with the reason."""
+"""Calibration on a real server: it is in force at once and stored in the rig file, or refused with the reason."""
 
 import tomllib
 from collections.abc import Iterator
@@ -10,6 +10,7 @@ from live_server import Stage, scene, serving
 
 from manipnet.actors.calibration import HAND_LENGTH_M, MARK_M, difference, sheet_at, wrist_on_sheet
 from manipnet.geometry import Array, compose, invert, quat_exp
+from manipnet.wire import Side
 
 RIG = """# stage two
 [bodies]
@@ -20,7 +21,7 @@ right_wrist = 2
 body = "Box"
 mesh = "cube"
 """
-SIDES = {"left": "left_wrist", "right": 2}
+SIDES: dict[Side, str | int] = {"left": "left_wrist", "right": 2}
 CLUSTERS = {
     "left": np.concatenate([[0.03, 0.02, -0.01], quat_exp(np.array([1.0, -2.0, 0.5]))]),
     "right": np.concatenate([[-0.05, 0.04, 0.02], quat_exp(np.array([0.3, 1.0, 2.0]))]),
@@ -45,20 +46,20 @@ def stage(tiny_bundle: Path, rig: Path) -> Iterator[Stage]:
         stage.close()
 
 
-def clusters_of(wrists: dict[str, Array], t_s: float) -> dict[str | int, Array | None]:
+def clusters_of(wrists: dict[Side, Array], t_s: float) -> dict[str | int, Array]:
     """The tracked clusters of two wrists, within the noise of a tracker."""
     rng = np.random.default_rng(round(1e4 * t_s))
     noise = np.concatenate([rng.normal(0.0, 5e-4, 3), quat_exp(rng.normal(0.0, 0.01, 3))])
     return {SIDES[side]: compose(compose(wrist, invert(CLUSTERS[side])), noise) for side, wrist in wrists.items()}
 
 
-def shown(scale: float = 1.0, back: float = 0.0) -> dict[str, Array]:
+def shown(scale: float = 1.0, back: float = 0.0) -> dict[Side, Array]:
     """Both wrists on the sheet, or drawn `back` from their marks."""
     away = np.array([0.0, 0.0, back, 0.0, 0.0, 0.0, 0.0])
     return {side: compose(SHEET, wrist_on_sheet(side, scale) + away) for side in SIDES}
 
 
-def ask_while(stage: Stage, wrists: dict[str, Array], **request) -> dict:
+def ask_while(stage: Stage, wrists: dict[Side, Array], **request) -> dict:
     """The answer to a request made after the hands were held still for two seconds."""
     answer = {}
 
@@ -72,7 +73,7 @@ def ask_while(stage: Stage, wrists: dict[str, Array], **request) -> dict:
     return answer
 
 
-def test_a_calibration_is_in_force_at_once_and_kept(stage: Stage, rig: Path) -> None:
+def test_a_calibration_is_in_force_at_once_and_stored(stage: Stage, rig: Path) -> None:
     answer = ask_while(stage, shown(0.9), op="calibrate", sheet=SHEET_SAID, hand_length=0.9 * HAND_LENGTH_M)
     assert answer["hand_scale"] == pytest.approx(0.9)
     assert answer["quality"] == "fair", "half a millimetre and half a degree of noise"
@@ -83,7 +84,7 @@ def test_a_calibration_is_in_force_at_once_and_kept(stage: Stage, rig: Path) -> 
         assert away_rad < np.radians(1.0)
         assert 0.5 < hand["spread_mm"] < 1.5
         assert hand["samples"] == pytest.approx(240, abs=5)
-    true = {side: np.array(scene(0.0)[f"{side}_wrist"]) for side in SIDES}
+    true: dict[Side, Array] = {side: np.array(scene(0.0)[f"{side}_wrist"]) for side in SIDES}
     message = stage.perform(0.5, lambda t: {**clusters_of(true, t), "Box": scene(t)["Box"]})[-1]
     for side in SIDES:
         away_m, away_rad = difference(message.hands[side].wrist, true[side])
@@ -98,7 +99,7 @@ def test_a_calibration_is_in_force_at_once_and_kept(stage: Stage, rig: Path) -> 
     assert (rig.parent / "rig.toml.bak").read_text(encoding="utf-8") == RIG
 
 
-def test_hand_size_by_touch_the_sheet_under_a_prop_and_a_placed_object(stage: Stage, rig: Path) -> None:
+def test_a_touch_measures_the_hands_a_prop_places_the_sheet_and_an_object_is_placed(stage: Stage, rig: Path) -> None:
     placed = ask_while(stage, {}, op="place_object", body="Box", on_sheet=True, sheet=SHEET_SAID)
     assert placed["position"] == pytest.approx([-0.01, -0.02, 0.0], abs=1e-6)  # the cube's bottom is 3 cm down
     first = ask_while(stage, shown(1.1), op="calibrate", reference="Box", hand="both")
@@ -113,7 +114,7 @@ def test_hand_size_by_touch_the_sheet_under_a_prop_and_a_placed_object(stage: St
         assert away_m < 2e-3
     stored = tomllib.loads(rig.read_text(encoding="utf-8"))
     assert stored["objects"][0]["position"] == pytest.approx([-0.01, -0.02, 0.0], abs=1e-5)
-    assert (rig.parent / "rig.toml.bak").read_text(encoding="utf-8") == RIG, "as it was before the server changed it"
+    assert (rig.parent / "rig.toml.bak").read_text(encoding="utf-8") == RIG, "the file from before the first change"
     nudged = {"op": "place_object", "body": "Box", "position": [0, 0.01, 0], "rotation": [0, 0, 0, 2], "store": False}
     assert stage.server.ask(nudged)["stored"] is None
     box = stage.server.ask({"op": "objects"})["bodies"]["actor"]["Box"]
@@ -121,17 +122,17 @@ def test_hand_size_by_touch_the_sheet_under_a_prop_and_a_placed_object(stage: St
     assert tomllib.loads(rig.read_text(encoding="utf-8")) == stored
 
 
-def test_what_cannot_be_used_is_refused_and_nothing_changes(stage: Stage, rig: Path) -> None:
+def test_a_pose_that_cannot_be_used_is_refused_and_nothing_changes(stage: Stage, rig: Path) -> None:
     crossed = dict(zip(SIDES, reversed(shown().values()), strict=True))
     refused = {
         "left_wrist is not tracked at present": stage.server.ask({"op": "calibrate"}),
         "it is at the right hand's mark": ask_while(stage, crossed, op="calibrate", sheet=SHEET_SAID),
-        "m from the left wrist's mark, at most 0.20 m": ask_while(stage, shown(), op="calibrate"),
+        "m from the left wrist's mark; at most 0.20 m are allowed": ask_while(stage, shown(), op="calibrate"),
     }
 
     def walking(t_s: float):
         if t_s == 2.25:
-            refused["while it was to be still"] = stage.server.ask({"op": "calibrate", "sheet": SHEET_SAID})
+            refused["while it had to be still"] = stage.server.ask({"op": "calibrate", "sheet": SHEET_SAID})
         away = np.array([0.02 * t_s, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         return clusters_of({side: wrist + away for side, wrist in shown().items()}, t_s)
 
@@ -143,7 +144,7 @@ def test_what_cannot_be_used_is_refused_and_nothing_changes(stage: Stage, rig: P
         return clusters_of(shown(), t_s)
 
     stage.perform(1.25, soon)
-    assert "tracked samples in that time, 16" in refused.pop("240 m tracked samples")["error"]
+    assert "tracked samples in that time, and at least 16" in refused.pop("240 m tracked samples")["error"]
     for complaint, answer in refused.items():
         assert complaint in answer["error"], answer
     assert rig.read_text(encoding="utf-8") == RIG
@@ -166,13 +167,13 @@ BAD = [
 ]
 
 
-def test_a_wrong_request_is_told_what_is_allowed(stage: Stage, rig: Path) -> None:
+def test_the_answer_to_a_wrong_request_tells_what_is_allowed(stage: Stage, rig: Path) -> None:
     for request, complaint in BAD:
         assert complaint in stage.server.ask({"op": "calibrate"} | request)["error"]
     assert rig.read_text(encoding="utf-8") == RIG
 
 
-def test_a_rig_that_cannot_be_written_costs_the_storing_only(stage: Stage, rig: Path) -> None:
+def test_a_calibration_is_in_force_even_if_the_rig_file_cannot_be_written(stage: Stage, rig: Path) -> None:
     rig.write_text("[bodies\n", encoding="utf-8")
     answer = ask_while(stage, shown(), op="calibrate", sheet=SHEET_SAID)
     assert answer["stored"] is None

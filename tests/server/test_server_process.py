@@ -31,7 +31,7 @@ def test_ready_names_every_address_and_a_signal_ends_it_with_status_0(tiny_bundl
         assert server.errors == [""]
 
 
-def test_the_second_line_says_what_is_going_on(tiny_bundle: Path) -> None:
+def test_the_line_of_each_second_tells_what_the_server_does(tiny_bundle: Path) -> None:
     with serving("--model", str(tiny_bundle)) as server:
         assert server.line().startswith("waiting for bodies")
 
@@ -57,7 +57,7 @@ def test_a_port_in_use_is_named_with_its_option(
 @pytest.mark.parametrize(
     ("options", "complaint"),
     [
-        (["--model", "colossus"], "model 'colossus' is no folder and no shipped bundle"),
+        (["--model", "colossus"], "model 'colossus' is neither a folder nor a shipped bundle"),
         (["--mesh", "Box"], "'Box' is not NAME=FILE"),
         (["--mesh", "Box=nowhere.obj"], "nowhere.obj: no such file"),
         (["--mesh", "Box=readme.txt"], "readme.txt: .txt format is unknown; allowed are .obj, .ply, .stl, .glb"),
@@ -71,7 +71,7 @@ def test_a_port_in_use_is_named_with_its_option(
         (["--vmc", "host:port"], "--vmc is 'host:port'; it must be HOST or HOST:PORT"),
     ],
 )
-def test_what_cannot_be_served_is_said_in_one_line(
+def test_a_configuration_that_cannot_be_served_is_refused_in_one_line(
     tiny_bundle: Path, capsys: pytest.CaptureFixture[str], options: list[str], complaint: str
 ) -> None:
     assert cli.main(["--model", str(tiny_bundle), *options]) == 1
@@ -101,7 +101,7 @@ def test_a_bundle_of_another_layout_is_refused(tmp_path: Path, capsys: pytest.Ca
     assert "another feature layout" in capsys.readouterr().err
 
 
-def test_with_keys_only_listed_clients_are_let_in(tiny_bundle: Path, tmp_path: Path) -> None:
+def test_with_keys_only_listed_clients_are_admitted(tiny_bundle: Path, tmp_path: Path) -> None:
     make_server_keys(tmp_path)
     keys = read_client_keys(make_client_keys(tmp_path, "stage-pc"))
     with serving("--model", str(tiny_bundle), "--keys", str(tmp_path)) as server:
@@ -119,8 +119,6 @@ def test_with_keys_only_listed_clients_are_let_in(tiny_bundle: Path, tmp_path: P
         assert "left" in server.ask({"op": "status"}, keys=keys)["actors"]["actor"]["hands"]
 
 
-def test_keys_that_are_not_there_are_named(
-    tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_missing_keys_are_named(tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--model", str(tiny_bundle), "--keys", str(tmp_path)]) == 1
     assert "server.toml does not exist; `manipnet keys make server` makes it" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""A server that is killed and started anew on its ports: sender and subscriber find it again without being asked to."""
+"""A server that is killed and started again on its ports: sender and subscriber find it by themselves."""
 
 import signal
 import sys

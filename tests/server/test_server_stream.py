@@ -1,4 +1,4 @@
-"""A real server over real sockets: every instant of a performance comes out once, whole, whatever else arrives."""
+"""A real server over real sockets: every tick of a performance comes out once and complete, whatever else arrives."""
 
 from itertools import pairwise
 
@@ -7,17 +7,19 @@ import pytest
 from live_server import Stage, Subscriber, scene
 
 from manipnet.actors.output_guard import MAX_SPEED_RAD_S
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.tracking.tick import TICK_S
 from manipnet.wire import TOPIC_BIN, HandsMessage
 
+HAND = shipped_hand()
+
 
 def assert_whole(stage: Stage, messages: list[HandsMessage], seconds: float) -> None:
-    """60 messages per second of stream time, none missing, every hand a possible one, no jump."""
+    """Check for 60 messages per second of stream time, possible hands, and no jump."""
     assert len(messages) == round(seconds * 60) + 1
     assert np.allclose(np.diff([m.t_capture for m in messages]), TICK_S)
     assert all(b.seq == a.seq + 1 for a, b in pairwise(messages))
-    low, high = DOF_LIMITS_RAD.T
+    low, high = HAND.limits.T
     for a, b in pairwise(messages):
         for side, hand in b.hands.items():
             assert np.all((low - 1e-6 <= hand.angles) & (hand.angles <= high + 1e-6))
@@ -25,7 +27,7 @@ def assert_whole(stage: Stage, messages: list[HandsMessage], seconds: float) -> 
 
 
 @pytest.mark.parametrize("rate_hz", [30.0, 75.0, 120.0])
-def test_a_performance_comes_out_whole(stage: Stage, rate_hz: float) -> None:
+def test_a_performance_comes_out_complete(stage: Stage, rate_hz: float) -> None:
     messages = stage.perform(1.2, scene, rate_hz)
     assert_whole(stage, messages, 1.2)
     for message in messages:
@@ -42,7 +44,7 @@ def test_a_performance_comes_out_whole(stage: Stage, rate_hz: float) -> None:
         assert np.allclose(message.hands["left"].joints[1, :3], message.hands["left"].wrist[:3])
 
 
-def test_both_encodings_say_the_same(stage: Stage) -> None:
+def test_both_encodings_hold_the_same(stage: Stage) -> None:
     binary = Subscriber(stage.server.addresses["hands"], TOPIC_BIN)
     packed = {m.seq: m for m in stage.perform(0.6, scene)}
     shared = [(m, packed[m.seq]) for m in binary.until(stage.start_s + 0.6) if m.seq in packed]
@@ -97,7 +99,7 @@ def test_a_frame_without_any_body_of_the_rig_is_counted(stage: Stage) -> None:
         ("jump", (3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
     ],
 )
-def test_an_impossible_pose_costs_only_its_body_its_sample(stage: Stage, fault: str, pose) -> None:
+def test_an_impossible_pose_costs_one_sample_of_one_body(stage: Stage, fault: str, pose) -> None:
     before = stage.counted("bodies_rejected", fault)
     poses = lambda t: scene(t) | ({"left_wrist": pose} if 0.2 < t < 0.24 else {})  # noqa: E731
     messages = stage.perform(0.6, poses)

@@ -1,4 +1,4 @@
-"""A real server fed through NatNet and OSC, by a fake Motive and by datagrams as `manipnet replay` sends them."""
+"""A real server that receives NatNet from a fake Motive, and OSC as `manipnet replay` sends it."""
 
 import socket
 import time

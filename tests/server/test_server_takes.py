@@ -1,4 +1,4 @@
-"""Stretches of the real takes through a real server: every tick, both hands, at the object they hold."""
+"""Parts of the real takes through a real server: every tick has both hands, at the object that they hold."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +17,7 @@ OBJECTS = {
     "teapot2": "teapot2",
     "wineglass3": "wineglass3",
 }
-"""Mesh by take."""
+"""The mesh of each take."""
 SECONDS = 1.5
 
 
@@ -31,7 +31,7 @@ def stage(manipnet_data: Path, tiny_bundle: Path) -> Iterator[Stage]:
 
 
 @pytest.mark.parametrize("name", OBJECTS)
-def test_a_real_take_comes_out_whole(stage: Stage, manipnet_data: Path, name: str) -> None:
+def test_a_real_take_comes_out_complete(stage: Stage, manipnet_data: Path, name: str) -> None:
     take = read_take(manipnet_data / "BVH" / name)
     first = len(take.time_s) // 2
 

@@ -15,7 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 _CENTER = """find => (...asked) => {
   const found = find(...asked);
@@ -47,7 +48,7 @@ _BY_LABEL = f"""(text, number) => {{
 class Page:
     """One page of the browser."""
 
-    def __init__(self, connection: ClientConnection) -> None:
+    def __init__(self, connection: Connection) -> None:
         self._connection, self._ids = connection, itertools.count(1)
 
     def call(self, method: str, **params: Any) -> dict:

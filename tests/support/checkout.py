@@ -42,4 +42,5 @@ def publishing(*options: str) -> Iterator[tuple[subprocess.Popen, str, str]]:
     finally:
         process.kill()
         process.wait()
-        process.stdout and process.stdout.close()
+        if process.stdout is not None:
+            process.stdout.close()

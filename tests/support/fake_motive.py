@@ -1,6 +1,6 @@
-"""A small Motive for tests: answers a NatNet client's requests and streams frames to it over loopback.
+"""A small Motive for tests, which answers the requests of a NatNet client and streams frames to it over loopback.
 
-`python tests/fake_motive.py traffic.pcapng --port 1510` plays a capture in a loop at 120 Hz, for trying by hand.
+`python tests/support/fake_motive.py traffic.pcapng --port 1510` plays a capture at 120 Hz, over and over.
 """
 
 import argparse

@@ -9,11 +9,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import msgpack
+import numpy as np
 import zmq
 
 from manipnet.common.options import Port
@@ -26,6 +27,9 @@ from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, decode_binary,
 PATIENCE_S = 60.0
 START_S = 300.0
 """The first start after a change compiles everything, perhaps on a busy machine."""
+Bodies = Mapping[Any, Sequence[float] | np.ndarray | None]
+"""Poses `(7,)` by name or id; None for a body that is not tracked."""
+Poses = Callable[[float], Bodies]
 
 
 def free_ports() -> list[str]:
@@ -68,7 +72,7 @@ class LiveServer:
             if keys is not None:
                 secure_client(req, keys)
             req.connect(self.addresses["control"])
-            packed = request if isinstance(request, bytes) else msgpack.packb(request) or b""
+            packed = request if isinstance(request, bytes) else msgpack.packb(request)
             req.send(json.dumps(request).encode() if as_json else packed)
             assert req.poll(int(1e3 * PATIENCE_S)), "no answer"
             return json.loads(req.recv()) if as_json else msgpack.unpackb(req.recv())
@@ -106,13 +110,13 @@ class Sender:
         assert self._socket.poll(int(1e3 * PATIENCE_S)), "the server does not subscribe"
         self._socket.recv()
 
-    def send(self, t_s: float, bodies: dict[str | int, Sequence[float] | None], **more: Any) -> None:
+    def send(self, t_s: float, bodies: Bodies, **more: Any) -> None:
         """Send one frame of poses `(7,)` by name or id, with None for a body that is not tracked."""
         entries = []
         for key, pose in bodies.items():
             p, q = (list(pose[:3]), list(pose[3:])) if pose is not None else ([0.0] * 3, [0.0, 0.0, 0.0, 1.0])
             entries.append({"name" if isinstance(key, str) else "id": key, "p": p, "q": q, "tracked": pose is not None})
-        self.send_raw(msgpack.packb({"t": t_s, "bodies": entries} | more) or b"")
+        self.send_raw(msgpack.packb({"t": t_s, "bodies": entries} | more))
 
     def send_raw(self, payload: bytes) -> None:
         self._socket.send(payload)
@@ -176,9 +180,6 @@ def own_address() -> str | None:
     return None if is_loopback(address) else address
 
 
-Poses = Callable[[float], dict[str | int, Sequence[float] | None]]
-
-
 class Stage:
     """A server with a sender and a subscriber, for several performances one after another."""
 
@@ -213,7 +214,7 @@ class Stage:
         self.subscriber.close()
 
 
-def scene(t_s: float) -> dict[str | int, Sequence[float] | None]:
+def scene(t_s: float) -> dict[str, tuple[float, ...]]:
     """Two hands that hold a box between them and swing it."""
     x, turn = 0.05 * math.sin(3.0 * t_s), (0.0, math.sin(0.2 * t_s), 0.0, math.cos(0.2 * t_s))
     return {

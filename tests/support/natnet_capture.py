@@ -62,8 +62,7 @@ def printed_frames():
         system = re.search(rf"^System latency : {NUMBER} milliseconds$", part, re.M)
         head = re.search(r"^Rigid Body \[ID=(\d+)  Error=(\d+\.\d+)  Valid=(\d)\]$", part, re.M)
         pose = re.search(rf"^\t{NUMBER}\t{NUMBER}\t{NUMBER}\t{NUMBER}\t{NUMBER}\t{NUMBER}\t{NUMBER}$", part, re.M)
-        found = [number, timestamp, software, system, head, pose]
-        if all(found):
+        if number and timestamp and software and system and head and pose:
             result[int(number[0])] = {
                 "timestamp_s": float(timestamp[1]),
                 "software_ms": float(software[1]),

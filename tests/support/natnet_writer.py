@@ -90,7 +90,9 @@ def definitions(names, version):
     return data
 
 
-def server_info(version=(3, 0), clock_hz=1_000_000, data_port=1511, group="239.255.42.99", name=b"Motive"):
+def server_info(
+    version=(3, 0), clock_hz=1_000_000, data_port=1511, group: str | None = "239.255.42.99", name=b"Motive"
+):
     """The payload of `SERVER_INFO`. Without a `group`, the server uses unicast."""
     return (
         name.ljust(256, b"\0")

@@ -7,6 +7,7 @@ import time
 import numpy as np
 import zmq
 
+from manipnet.geometry import Side
 from manipnet.outputs.websocket.server import WebSocketPublisher
 from manipnet.telemetry import Telemetry
 from manipnet.wire import (
@@ -18,7 +19,6 @@ from manipnet.wire import (
     encode_binary,
     encode_msgpack,
 )
-from manipnet.wire.hands import Side
 
 RATE_HZ = 60
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])

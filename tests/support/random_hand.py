@@ -6,11 +6,12 @@ import numpy as np
 from make_vectors import messages
 from manipnet_client.retarget import BONES
 
-from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply
+from manipnet.geometry import Side, matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, PARENTS
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import HandsMessage
-from manipnet.wire.hands import Side
+
+HAND = shipped_hand()
 
 ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 """The joint at which each finger bone of `BONES` ends."""
@@ -18,11 +19,11 @@ ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 
 def posed(side: Side, rng: np.random.Generator) -> tuple[HandsMessage, np.ndarray]:
     """A message with one random hand, and the unit directions of its finger bones in the wrist frame `(15, 3)`."""
-    angles = rng.uniform(*DOF_LIMITS_RAD.T)
-    positions, matrices = forward_kinematics(angles)
+    angles = rng.uniform(*HAND.limits.T)
+    positions, matrices = forward_kinematics(HAND, angles)
     world = matrix_to_quat(matrices)
     local = world.copy()
-    local[1:] = quat_multiply(quat_conjugate(world[PARENTS[1:17]]), world[1:])
+    local[1:] = quat_multiply(quat_conjugate(world[HAND.parents[1:17]]), world[1:])
     along = positions[ENDS] - positions[BONES]
     if side == "left":
         local, along = mirror_quats(local), along * [-1, 1, 1]

@@ -1,4 +1,4 @@
-"""A bundle without training: it always proposes nearly the same pose, and runs in no time."""
+"""A bundle without training: its network always answers with nearly the same pose, in no time."""
 
 import hashlib
 import json
@@ -7,21 +7,45 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES, PARENTS
 from manipnet.synthesis.model.bundle import FORMAT
-from manipnet.synthesis.model.layout import INPUT_SIZE, OUTPUT, OUTPUT_SIZE, describe
+from manipnet.synthesis.model.features import pose_outputs
+from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
 
 
-def write_tiny_bundle(folder: Path, spread: float = 1e-3) -> Path:
-    """A bundle whose network is a random map of rank 4 around a half-closed hand; `spread` scales the map."""
+def write_tiny_bundle(folder: Path, spread: float = 1e-3, hand: Hand | None = None) -> Path:
+    """Write a bundle of a hand, the shipped one by default, whose network is `tiny_network`."""
+    hand = hand or shipped_hand()
+    content = tiny_network(hand, spread)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "manipnet.onnx").write_bytes(content)
+    write_hand(hand, folder / HAND_FILE)
+    meta = {
+        "format": FORMAT,
+        "layout": layout_of(hand).describe(),
+        "angle_names": list(hand.angle_names),
+        "rest_angles_rad": (hand.limits @ [0.7, 0.3]).tolist(),
+        "response": 0.5,
+        "limits_rad": hand.limits.tolist(),
+        "model_sha256": hashlib.sha256(content).hexdigest(),
+    }
+    (folder / "bundle.json").write_text(json.dumps(meta))
+    return folder
+
+
+def tiny_network(hand: Hand, spread: float = 1e-3) -> bytes:
+    """An ONNX graph: a random map of rank 4 around a half-closed hand 2 cm from everything; `spread` scales the map."""
     onnx = pytest.importorskip("onnx", reason="onnx is not installed: python -m pip install onnx")
     helper, from_array = onnx.helper, onnx.numpy_helper.from_array
-    rng = np.random.default_rng(7)
+    layout, rng = layout_of(hand), np.random.default_rng(7)
+    positions, rotations = forward_kinematics(hand, hand.limits[None] @ [0.6, 0.4])
     weights = {
-        "narrow": rng.normal(size=(INPUT_SIZE, 4)) / np.sqrt(INPUT_SIZE),
-        "wide": spread * rng.normal(size=(4, OUTPUT_SIZE)),
-        "bias": _output_of(DOF_LIMITS_RAD @ [0.6, 0.4]),
+        "narrow": rng.normal(size=(layout.input_size, 4)) / np.sqrt(layout.input_size),
+        "wide": spread * rng.normal(size=(4, layout.output_size)),
+        "bias": pose_outputs(hand, positions, rotations, np.full((1, hand.joint_count), 0.02))[0],
     }
     graph = helper.make_graph(
         [
@@ -31,32 +55,9 @@ def write_tiny_bundle(folder: Path, spread: float = 1e-3) -> Path:
             helper.make_node("Add", ["many", "bias"], ["outputs"]),
         ],
         "tiny",
-        [helper.make_tensor_value_info("features", onnx.TensorProto.FLOAT, ["hands", INPUT_SIZE])],
-        [helper.make_tensor_value_info("outputs", onnx.TensorProto.FLOAT, ["hands", OUTPUT_SIZE])],
+        [helper.make_tensor_value_info("features", onnx.TensorProto.FLOAT, ["hands", layout.input_size])],
+        [helper.make_tensor_value_info("outputs", onnx.TensorProto.FLOAT, ["hands", layout.output_size])],
         [from_array(value.astype(np.float32), name) for name, value in weights.items()],
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
-    content = model.SerializeToString()
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "manipnet.onnx").write_bytes(content)
-    meta = {
-        "format": FORMAT,
-        "layout": describe(),
-        "dofs": list(DOF_NAMES),
-        "rest_angles_rad": (DOF_LIMITS_RAD @ [0.7, 0.3]).tolist(),
-        "response": 0.5,
-        "limits_rad": DOF_LIMITS_RAD.tolist(),
-        "model_sha256": hashlib.sha256(content).hexdigest(),
-    }
-    (folder / "bundle.json").write_text(json.dumps(meta))
-    return folder
-
-
-def _output_of(angles: np.ndarray) -> np.ndarray:
-    """The network output `(220,)` that means the pose of `angles`, 2 cm from everything."""
-    positions, rotations = forward_kinematics(angles)
-    bones = np.concatenate([rotations, rotations[PARENTS[17:]]])
-    output = np.full(OUTPUT_SIZE, 0.02)
-    output[OUTPUT["joint_positions"].columns] = positions.reshape(-1)
-    output[OUTPUT["joint_axes"].columns] = bones[:, :, :2].transpose(0, 2, 1).reshape(-1)
-    return output
+    return model.SerializeToString()

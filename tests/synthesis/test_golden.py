@@ -14,14 +14,20 @@ from written_scene import scenes_at
 
 from manipnet.actors.hands_message import hand_poses
 from manipnet.actors.transitions import ShownHand
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.ik.pose import FEEDBACK_SHARE
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.model.features import features
-from manipnet.synthesis.model.layout import INPUT, PRESENT
+from manipnet.synthesis.model.layout import PRESENT, layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer, windows_of
+from manipnet.wire import Side
 from manipnet_tools.bench.shapes import gourd
+
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
 
 STORED = Path(__file__).with_name("golden.npz")
 TICKS = 6
@@ -52,23 +58,25 @@ def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
                 "raw_positions": [step.raw_positions for step in steps],
                 "distances": [step.distances for step in steps],
             }
-            | _in_world(scenes, steps)
+            | _in_world(bundle.hand, scenes, steps)
         )
     return {name: np.array([tick[name] for tick in ticks], dtype=np.float32) for name in ticks[0]}
 
 
-def _in_world(scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
+def _in_world(hand: Hand, scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
     """What clients get of each hand, its size a little off."""
-    pairs = [
+    pairs: list[tuple[Side, ShownHand]] = [
         (scene.side, ShownHand("live", step.angles, scene.wrist[PRESENT], None))
         for scene, step in zip(scenes, steps, strict=True)
     ]
-    poses = list(hand_poses(dict(pairs[:2]), 1.1).values()) + list(hand_poses(dict(pairs[2:]), 1.1).values())
+    poses = list(hand_poses(HAND, dict(pairs[:2]), 1.1).values()) + list(
+        hand_poses(HAND, dict(pairs[2:]), 1.1).values()
+    )
     return {"joints": [pose.joints for pose in poses], "local_rotations": [pose.rotations for pose in poses]}
 
 
 def _features(scene: HandScene, state: HandState) -> np.ndarray:
-    return features(scene.shape, windows_of([scene]), state.positions[None], state.rotations[None])[0]
+    return features(HAND, scene.shape, windows_of([scene]), state.positions[None], state.rotations[None])[0]
 
 
 @pytest.fixture(scope="module")
@@ -84,16 +92,16 @@ def stored() -> dict[str, np.ndarray]:
 
 def test_features_are_what_they_were(computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
     off = np.abs(computed["features"] - stored["features"]) > FEATURES_WITHIN
-    rays = off[..., INPUT["proximity"].columns]
+    rays = off[..., LAYOUT.input["proximity"].columns]
     assert rays.sum() <= STRAY_RAYS
     assert off.sum() == rays.sum(), f"columns {np.unique(np.argwhere(off)[:, -1])[:20]} differ"
 
 
 def test_the_scene_has_everything_in_it(stored: dict[str, np.ndarray]) -> None:
-    rays = stored["features"][..., INPUT["proximity"].columns]
+    rays = stored["features"][..., LAYOUT.input["proximity"].columns]
     assert rays.min() < 0.0 < rays[rays > 0.0].min() < 0.01, "sensors inside, near and far"
-    assert stored["features"][..., INPUT["ambient"].columns].mean() > 0.01
-    assert stored["features"][..., INPUT["signed_distances"].columns].min() < 0.01
+    assert stored["features"][..., LAYOUT.input["ambient"].columns].mean() > 0.01
+    assert stored["features"][..., LAYOUT.input["signed_distances"].columns].min() < 0.01
     assert np.abs(stored["positions"] - stored["raw_positions"]).max() > 1e-3, "the solver has work to do"
 
 
@@ -119,9 +127,9 @@ def test_the_next_tick_sees_part_of_the_correction(tiny_bundle: Path, tmp_path: 
     step = synthesizer.step(scenes_at(0, shapes), [synthesizer.rest_state()] * 3)[0]
     predicted = (step.state.angles - FEEDBACK_SHARE * step.angles) / (1.0 - FEEDBACK_SHARE)
     assert np.abs(step.angles - predicted).max() > 0.01, "the solver has work to do"
-    np.testing.assert_allclose(forward_kinematics(predicted)[0], step.raw_positions, atol=1e-9)
-    np.testing.assert_allclose(forward_kinematics(step.angles)[0], step.positions, atol=1e-9)
-    np.testing.assert_allclose(forward_kinematics(step.state.angles)[0], step.state.positions, atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(HAND, predicted)[0], step.raw_positions, atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(HAND, step.angles)[0], step.positions, atol=1e-9)
+    np.testing.assert_allclose(forward_kinematics(HAND, step.state.angles)[0], step.state.positions, atol=1e-9)
 
 
 if __name__ == "__main__":

@@ -7,15 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
 from manipnet.synthesis.model.bundle import FORMAT
 from manipnet.synthesis.model.features import pose_outputs
-from manipnet.synthesis.model.layout import INPUT_SIZE, OUTPUT_SIZE, describe
+from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.evaluation.cases import Case, load_cases
 
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
+
 TAKES = ("cyl_med3", "mug1")
-STILL_ANGLES = np.clip(np.full(20, 0.2), DOF_LIMITS_RAD[:, 0], DOF_LIMITS_RAD[:, 1])
+STILL_ANGLES = np.clip(np.full(20, 0.2), HAND.limits[:, 0], HAND.limits[:, 1])
 
 
 @pytest.fixture(scope="session")
@@ -28,8 +32,8 @@ def cases(manipnet_data) -> dict[str, Case]:
 def still_model(tmp_path_factory) -> Path:
     """A bundle whose network answers `STILL_ANGLES`, far from any surface, whatever it is shown."""
     onnx = pytest.importorskip("onnx", reason="the extra `train` makes test models")
-    positions, rotations = forward_kinematics(STILL_ANGLES[None])
-    answer = pose_outputs(positions, rotations, np.full((1, 22), 1.0))[0]
+    positions, rotations = forward_kinematics(HAND, STILL_ANGLES[None])
+    answer = pose_outputs(HAND, positions, rotations, np.full((1, 22), 1.0))[0]
     helper, kind = onnx.helper, onnx.TensorProto.FLOAT
     graph = helper.make_graph(
         [
@@ -37,10 +41,10 @@ def still_model(tmp_path_factory) -> Path:
             helper.make_node("Add", ["zero", "answer"], ["pose"]),
         ],
         "still",
-        [helper.make_tensor_value_info("features", kind, ["n", INPUT_SIZE])],
-        [helper.make_tensor_value_info("pose", kind, ["n", OUTPUT_SIZE])],
+        [helper.make_tensor_value_info("features", kind, ["n", LAYOUT.input_size])],
+        [helper.make_tensor_value_info("pose", kind, ["n", LAYOUT.output_size])],
         [
-            onnx.numpy_helper.from_array(np.zeros((INPUT_SIZE, OUTPUT_SIZE), np.float32), "nothing"),
+            onnx.numpy_helper.from_array(np.zeros((LAYOUT.input_size, LAYOUT.output_size), np.float32), "nothing"),
             onnx.numpy_helper.from_array(answer.astype(np.float32), "answer"),
         ],
     )
@@ -50,12 +54,13 @@ def still_model(tmp_path_factory) -> Path:
     (folder / "manipnet.onnx").write_bytes(content)
     meta = {
         "format": FORMAT,
-        "layout": describe(),
-        "dofs": list(DOF_NAMES),
+        "layout": LAYOUT.describe(),
+        "angle_names": list(HAND.angle_names),
         "rest_angles_rad": [0.0] * 20,
-        "limits_rad": DOF_LIMITS_RAD.tolist(),
+        "limits_rad": HAND.limits.tolist(),
         "response": 0.5,
         "model_sha256": hashlib.sha256(content).hexdigest(),
     }
     (folder / "bundle.json").write_text(json.dumps(meta))
+    write_hand(HAND, folder / HAND_FILE)
     return folder

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_server import scene
+from tracked_bodies import record_scene
 
-from manipnet.recording.mcap_file import RecordingWriter, read_about
+from manipnet.recording.mcap_file import read_about
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 from manipnet.wire import SIDES
-from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
 
 CUBE = LIBRARY_FOLDER / "cube.ply"
@@ -21,16 +21,7 @@ CUBE = LIBRARY_FOLDER / "cube.ply"
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     """Two hands that swing a box for 1.5 s."""
-    path = tmp_path / "swing.mcap"
-    with RecordingWriter(path, {"model": "none"}) as writer:
-        for k in range(181):
-            bodies = [
-                BodySample(None, str(name), tuple(pose[:3]), tuple(pose[3:]), True)
-                for name, pose in scene(k / 120).items()
-                if pose is not None
-            ]
-            writer.write_bodies(BodyFrame(50.0 + k / 120, k, tuple(bodies), 0.0, "test"), k * 8_333_333)
-    return path
+    return record_scene(tmp_path / "swing.mcap", 1.5, start_s=50.0)
 
 
 def error_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -108,7 +99,7 @@ def test_an_error_is_one_line(
     assert "must be tcp://HOST:PORT" in error_of(capsys, "replay", str(recording), "--to", "udp://x")
     assert "File exists" in error_of(capsys, "recover", str(recording), "--out", str(recording))
     (tmp_path / "text.mcap").write_text("text")
-    assert "is no recording" in error_of(
+    assert "not a recording" in error_of(
         capsys, "recover", str(tmp_path / "text.mcap"), "--out", str(tmp_path / "out.mcap")
     )
     monkeypatch.setitem(sys.modules, "torch", None)
@@ -142,8 +133,8 @@ def test_long_paths_and_brackets_are_printed_as_they_are(
     deep.mkdir(parents=True)
     (deep / "broken.csv").write_text("nothing")
     joints, bones = np.zeros((2, 22, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 17, 1))
-    hands = {f"{side}_positions": joints for side in SIDES} | {f"{side}_rotations": bones for side in SIDES}
-    np.savez(tmp_path / "fingers.npz", time=np.arange(2) / 60, **hands)
+    hands = {f"{side}_{name}": array for side in SIDES for name, array in (("positions", joints), ("rotations", bones))}
+    np.savez(tmp_path / "fingers.npz", **{"time": np.arange(2) / 60} | hands)  # pyright: ignore[reportArgumentType]
     names = {"RECORDING": recording, "CUBE": CUBE, "MODEL": tiny_bundle, "FINGERS": tmp_path / "fingers.npz"}
     names |= {"DEEP": deep, "TAKES": tmp_path / "takes", "OUT": tmp_path / "out"}
 

@@ -1,4 +1,4 @@
-"""Body gates: what a tracker may do and what it cannot, on made-up motion and on real takes."""
+"""The outlier gate rejects what no body can do, and nothing else, on made-up motion and on real takes."""
 
 import itertools
 import math
@@ -10,7 +10,7 @@ import pytest
 
 from manipnet.inputs.natnet.frames import read_frame
 from manipnet.telemetry import BODY_REASONS
-from manipnet.tracking.outlier_gate import CONFIRM_S, FORGET_S, FROZEN_S, MAX_BODIES_KNOWN, OutlierGate
+from manipnet.tracking.outlier_gate import CONFIRM_S, FORGET_S, FROZEN_S, MAX_BODIES, OutlierGate
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.takes.take import read_take
 
@@ -46,14 +46,14 @@ def shaking(seconds, start_s=0.0, amplitude_m=1e-5):
     ]
 
 
-def test_a_frame_without_fault_is_handed_on_as_it_is():
+def test_a_frame_without_fault_is_passed_on_unchanged():
     one = frame(0.0, ("wrist", (0.0, 1.0, 0.0)))
     assert OutlierGate().check(one) == (one, [])
 
 
 @pytest.mark.parametrize("speed_m_s", [0.1, 5.0, 15.0])
 @pytest.mark.parametrize("rate_hz", [30, 120, 360])
-def test_fast_motion_is_no_jump(speed_m_s, rate_hz):
+def test_fast_motion_is_not_a_jump(speed_m_s, rate_hz):
     gate = OutlierGate()
     motion = [
         frame(n / rate_hz, ("wrist", (speed_m_s * n / rate_hz, 1, 0), turned(20 * 57 * n / rate_hz)))
@@ -62,7 +62,7 @@ def test_fast_motion_is_no_jump(speed_m_s, rate_hz):
     assert set(faults(gate, motion)) == {None}
 
 
-def test_lost_frames_allow_a_longer_way():
+def test_lost_frames_allow_a_longer_step():
     gate = OutlierGate()
     assert faults(gate, [frame(0.0, ("wrist", (0, 1, 0))), frame(0.2, ("wrist", (2.0, 1, 0)))]) == [None, None]
 
@@ -70,13 +70,13 @@ def test_lost_frames_allow_a_longer_way():
 @pytest.mark.parametrize(
     ("p", "q"), [((1.0, 1.5, 0.0), UNTURNED), ((1.0, 1.0, 0.0), turned(120)), ((9.0, 9.0, 9.0), turned(180))]
 )
-def test_one_wild_sample_is_left_out(p, q):
+def test_one_wild_sample_is_rejected(p, q):
     gate = OutlierGate()
     before, wild, after = still(0.1), frame(0.1, ("wrist", p, q)), still(0.1, start_s=0.1 + 1 / HZ)
     assert faults(gate, [*before, wild, *after]) == [None] * 12 + ["jump"] + [None] * 12
 
 
-def test_a_body_that_stays_where_it_jumped_to_is_believed_after_a_while():
+def test_a_body_that_stays_where_it_jumped_to_is_accepted_after_a_while():
     gate = OutlierGate()
     faults(gate, still(0.1))
     result = faults(gate, still(0.5, p=(3.0, 1.0, 0.0), start_s=0.1))
@@ -84,19 +84,19 @@ def test_a_body_that_stays_where_it_jumped_to_is_believed_after_a_while():
     assert result == ["jump"] * held + [None] * (len(result) - held)
 
 
-def test_wild_samples_all_over_the_place_are_never_believed():
+def test_wild_samples_in_many_places_are_never_accepted():
     gate = OutlierGate()
     faults(gate, still(0.1))
     wild = [frame(0.1 + n / HZ, ("wrist", (50.0 * (n % 7) + 50, 1, 0))) for n in range(round((FORGET_S - 0.1) * HZ))]
     assert set(faults(gate, wild)) == {"jump"}
 
 
-def test_a_body_found_after_a_long_loss_is_taken_where_it_appears():
+def test_after_a_long_loss_a_body_is_accepted_where_it_appears():
     gate = OutlierGate()
     assert faults(gate, [*still(0.1), frame(5.0, ("wrist", (4.0, 1, 0)))])[-1] is None
 
 
-def test_a_restarted_sender_is_taken_where_it_appears():
+def test_a_body_of_a_restarted_sender_is_accepted_where_it_appears():
     gate = OutlierGate()
     faults(gate, still(0.5, start_s=100.0))
     assert faults(gate, [frame(0.0, ("wrist", (4.0, 1, 0)))]) == [None]
@@ -109,7 +109,7 @@ def test_a_late_frame_is_judged_by_its_distance_in_time():
     assert set(faults(gate, [path[n] for n in order])) == {None}
 
 
-def test_two_bodies_that_swap_are_held_until_they_swap_back():
+def test_two_swapped_bodies_are_rejected_until_they_swap_back():
     gate = OutlierGate()
     near, far = (0.0, 1.0, 0.0), (0.1, 1.0, 0.0)
 
@@ -130,14 +130,14 @@ def test_two_bodies_that_pass_each_other_do_not_swap():
         assert not gate.check(frame(n / HZ, ("left", (x, 1.0, 0)), ("right", (-x, 1.02, 0))))[1]
 
 
-def test_zeros_are_never_believed_where_the_body_was_elsewhere():
+def test_zeros_are_never_accepted_from_a_body_that_was_elsewhere():
     gate = OutlierGate()
     assert set(faults(gate, still(0.5))) == {None}
     assert set(faults(gate, still(5.0, p=(0.0, 0.0, 0.0), start_s=0.5))) == {"zeros"}
     assert faults(gate, still(0.1, start_s=5.5))[0] is None
 
 
-def test_a_body_that_lives_at_the_origin_may_be_there():
+def test_a_body_near_the_origin_may_be_at_the_origin():
     gate = OutlierGate()
     assert set(faults(gate, still(2.0, p=(0.0, 0.0, 0.0)))) == {None}
 
@@ -148,7 +148,7 @@ def moving(frames):
     return [replace(f, bodies=f.bodies + other.bodies) for f, other in zip(frames, others, strict=True)]
 
 
-def test_a_tracked_body_that_freezes_is_noticed_and_comes_back():
+def test_a_tracked_body_that_freezes_is_rejected_until_it_moves_again():
     gate = OutlierGate()
     assert set(faults(gate, moving(shaking(1.0)))) == {None}
     frozen = faults(gate, moving(still(3.0, start_s=1.0)))
@@ -157,13 +157,13 @@ def test_a_tracked_body_that_freezes_is_noticed_and_comes_back():
     assert set(faults(gate, moving(shaking(1.0, start_s=4.0)))) == {None}
 
 
-def test_where_everything_stands_still_nothing_is_frozen():
+def test_nothing_is_frozen_while_everything_stands_still():
     gate = OutlierGate()
     faults(gate, shaking(1.0))
     assert set(faults(gate, still(3.0, start_s=1.0))) == {None}
 
 
-def test_a_frozen_real_body_is_noticed():
+def test_a_frozen_real_body_is_rejected():
     gate = OutlierGate()
     frames = [read_frame(payload, (3, 0)) for payload in natnet_capture.frames()]
     live = [frame(f.timestamp_s, ("quad", f.bodies[0].p, f.bodies[0].q)) for f in frames]
@@ -172,7 +172,7 @@ def test_a_frozen_real_body_is_noticed():
     assert faults(gate, moving(still(1.0, last.p, end_s + 1 / HZ, last.q, "quad")))[-1] == "frozen"
 
 
-def test_a_computed_body_may_stand_still_for_ever():
+def test_a_computed_body_may_stand_still():
     gate = OutlierGate()
     glide = [frame(n / HZ, ("wrist", (0.5 - 0.5 * math.cos(n / HZ), 1.0, 0.0))) for n in range(4 * HZ)]
     assert set(faults(gate, moving([*glide, *still(3.0, glide[-1].bodies[0].p, 4.0)]))) == {None}
@@ -185,7 +185,7 @@ def test_faults_of_the_parser_are_counted():
     assert OutlierGate().check(given) == (given, ["nan"])
 
 
-def test_senders_and_bodies_are_judged_apart():
+def test_senders_and_bodies_are_judged_separately():
     gate = OutlierGate()
     gate.check(frame(0.0, ("wrist", (0, 1, 0)), ("mug", (3, 1, 0))))
     assert not gate.check(frame(0.0, ("wrist", (9, 1, 0)), source="another"))[1]
@@ -193,12 +193,12 @@ def test_senders_and_bodies_are_judged_apart():
 
 def test_memory_is_bounded():
     gate = OutlierGate()
-    for n in range(3 * MAX_BODIES_KNOWN):
+    for n in range(3 * MAX_BODIES):
         gate.check(frame(0.0, (f"body {n}", (0, 1, 0))))
-    assert len(gate._memories) <= MAX_BODIES_KNOWN
+    assert gate.known_bodies <= MAX_BODIES
 
 
-def test_reasons_are_counted_ones():
+def test_every_reason_is_a_label_of_the_counter():
     assert {"nan", "bounds", "zero_quaternion", "frozen", "jump", "swap", "zeros"} == set(BODY_REASONS)
 
 

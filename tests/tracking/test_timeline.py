@@ -1,4 +1,4 @@
-"""Stream time: every tick comes out once, at its own instant, whatever the sender's rate and manners."""
+"""Stream time: every tick comes out once, at its own instant, whatever the sender does."""
 
 from collections.abc import Iterable
 
@@ -41,7 +41,7 @@ def drain(timeline: Timeline, now_s: float) -> list[Tick]:
 
 
 def stream(timeline: Timeline, times_s: Iterable[float], start_s: float = 100.0, speed: float = 1.0) -> list[Tick]:
-    """Frames that arrive as they were captured, `start_s` later on our clock."""
+    """Push frames that arrive as they were captured, `start_s` later by our clock; returns the ticks."""
     ticks = []
     for t in times_s:
         now = start_s + t / speed
@@ -52,7 +52,7 @@ def stream(timeline: Timeline, times_s: Iterable[float], start_s: float = 100.0,
 
 
 def carry_on(timeline: Timeline, from_s: float, to_s: float) -> list[Tick]:
-    """No more frames: polled exactly when the timeline asks to be."""
+    """Ticks without further frames, polled exactly when the timeline asks for it."""
     ticks = []
     while (now := timeline.next_poll_s(from_s)) <= to_s:
         ticks += drain(timeline, now)
@@ -145,7 +145,7 @@ def test_a_tick_falls_due_with_the_frame_that_completes_its_look_ahead(look_ahea
             assert tick.waited_for_s == 50.0 + t
 
 
-def test_a_tick_that_is_polled_late_knows_since_when_it_was_due() -> None:
+def test_a_tick_that_is_polled_late_tells_when_it_was_due() -> None:
     timeline = Timeline(0.1)
     for i in range(60):
         timeline.push(i / 120, {"body": screw(i / 120)}, 50.0 + i / 120)
@@ -163,7 +163,7 @@ def test_beyond_the_look_ahead_the_future_is_forecast() -> None:
     assert error[0] < 0.2 * standing[0]
 
 
-def test_samples_past_the_look_ahead_are_not_used_even_when_they_are_there() -> None:
+def test_samples_past_the_look_ahead_are_not_used_even_if_they_have_arrived() -> None:
     """A burst of frames must give what a steady stream gives."""
     burst = Timeline(0.1)
     for i in range(61):
@@ -173,7 +173,7 @@ def test_samples_past_the_look_ahead_are_not_used_even_when_they_are_there() -> 
         assert np.array_equal(a.bodies["body"].window, b.bodies["body"].window)
 
 
-def test_our_clock_carries_the_ticks_through_a_silence_and_after_it_none_is_missing() -> None:
+def test_our_clock_carries_the_ticks_through_a_silence_and_none_is_missing_after_it() -> None:
     timeline = Timeline()
     before = stream(timeline, np.arange(121) / 120)
     during = carry_on(timeline, 101.0, 103.0)
@@ -187,21 +187,21 @@ def test_our_clock_carries_the_ticks_through_a_silence_and_after_it_none_is_miss
     assert timeline.restarts == timeline.skipped_late == 0
 
 
-def test_a_short_pause_of_arrival_is_no_silence() -> None:
+def test_a_short_pause_of_arrivals_is_not_a_silence() -> None:
     timeline = Timeline()
     stream(timeline, np.arange(121) / 120)
     assert drain(timeline, 101.0 + SILENCE_S - 1e-3) == []
 
 
 @pytest.mark.parametrize("rate_hz", [30.0, 120.0])
-def test_a_slow_replay_is_not_taken_for_silence(rate_hz: float) -> None:
+def test_a_slow_replay_is_not_a_silence(rate_hz: float) -> None:
     timeline = Timeline()
     ticks = stream(timeline, np.arange(int(2 * rate_hz)) / rate_hz, speed=0.25)
     assert not any(tick.silent for tick in ticks)
 
 
 @pytest.mark.parametrize("pause_s", [0.3, 3.0])
-def test_a_sender_that_stood_still_and_goes_on_is_followed_again(pause_s: float) -> None:
+def test_a_sender_that_paused_and_resumes_is_followed_again(pause_s: float) -> None:
     timeline = Timeline()
     ticks = stream(timeline, np.arange(121) / 120)
     ticks += carry_on(timeline, 101.0, 101.0 + pause_s)
@@ -219,11 +219,11 @@ def test_a_sender_that_stood_still_and_goes_on_is_followed_again(pause_s: float)
     assert not last.silent
 
 
-def test_a_sender_that_was_only_late_and_catches_up_loses_no_tick_and_repeats_none() -> None:
+def test_a_sender_that_was_late_and_catches_up_loses_and_repeats_no_tick() -> None:
     timeline = Timeline()
     ticks = stream(timeline, np.arange(121) / 120)
     ticks += carry_on(timeline, 101.0, 104.0)
-    for i in range(121, 601):  # all of three seconds within a tenth of one, then as usual
+    for i in range(121, 601):  # three seconds of frames arrive within a tenth of a second, then frames arrive as usual
         now = 104.0 + (i - 120) / 4800 if i < 481 else 104.0 + (i - 480) / 120
         timeline.push(i / 120, {"body": screw(i / 120)}, now)
         ticks += drain(timeline, now)
@@ -232,7 +232,7 @@ def test_a_sender_that_was_only_late_and_catches_up_loses_no_tick_and_repeats_no
     assert timeline.restarts == timeline.skipped_late == 0
 
 
-def test_a_sender_restart_plays_out_the_old_take_and_begins_anew() -> None:
+def test_a_sender_restart_plays_out_the_old_run_and_begins_a_new_one() -> None:
     """The player loops: time goes back to zero without a pause, and no tick of either pass is lost."""
     timeline = Timeline()
     ticks = stream(timeline, np.arange(121) / 120, start_s=100.0)
@@ -255,7 +255,7 @@ def test_one_bad_time_stamp_moves_nothing() -> None:
     assert timeline.restarts == 0
 
 
-def test_a_frame_that_was_under_way_too_long_is_called_late() -> None:
+def test_a_frame_that_was_delayed_too_long_is_late() -> None:
     timeline = Timeline()
     stream(timeline, np.arange(600) / 120)
     assert timeline.push(4.2, {"body": screw(4.2)}, 105.0) == "late"
@@ -263,7 +263,7 @@ def test_a_frame_that_was_under_way_too_long_is_called_late() -> None:
     assert timeline.restarts == 0
 
 
-def test_a_second_sender_is_kept_out_until_the_first_falls_silent() -> None:
+def test_a_second_sender_is_refused_until_the_first_falls_silent() -> None:
     timeline = Timeline()
     for i in range(120):
         now = 10.0 + i / 120
@@ -310,7 +310,7 @@ def tick_age(ticks: list[Tick], body: str) -> float:
     return ticks[-1].bodies[body].age_s
 
 
-def test_ticks_wait_for_a_body_that_comes_in_a_message_of_its_own() -> None:
+def test_ticks_wait_for_a_body_that_comes_in_its_own_message() -> None:
     timeline = Timeline(0.0)
     for i in range(40):
         timeline.push(i / 60, {"body": screw(i / 60)}, 10.0 + i / 60)
@@ -359,7 +359,7 @@ def test_the_log_of_rotation_in_a_window_is_steady() -> None:
 
 @pytest.mark.parametrize("drift", [-1e-4, 1e-4])
 def test_a_senders_clock_may_drift_from_ours(drift: float) -> None:
-    """Ticks go by the sender's time, and each leaves with the frame that completes it: delay does not build up."""
+    """Ticks follow the sender's time, and each comes with the frame that completes it, so no delay builds up."""
     timeline = Timeline(0.1)
     ticks: list[tuple[float, Tick]] = []
     for i in range(20 * 60):

@@ -29,8 +29,8 @@ class Stats:
 
     `received` counts readable frames, `late` those of them that came too late to be shown, `refused` frames that could
     not be read, and `lost` frames that never arrived. `seq` is the number of the newest frame, and `age_s` the time
-    since it arrived. `transit_s` is the time from its publication to its arrival, which is meaningful only if server and
-    client share a clock.
+    since it arrived. `transit_s` is the time from its publication to its arrival, which is meaningful only if server
+    and client share a clock.
     """
 
     state: str = "connecting"

@@ -12,7 +12,6 @@ from manipnet.actors.props import Prop, choose_prop
 from manipnet.actors.transitions import HOLD_AFTER_S, ShownHand, state_at_age
 from manipnet.config.settings import MAX_OBJECTS, WRISTS, ActorConfig, BodyKey
 from manipnet.geometry import Array, compose, invert
-from manipnet.synthesis.hand.skeleton import DOF_NAMES
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene, HandState
@@ -34,10 +33,14 @@ class Actor:
         self.seq = 0
         """Number of the next message."""
         self.paused = False
-        limits = _limits(config, bundle.limits)
+        self.model_hand = bundle.hand
+        """The hand that is synthesised, of size 1."""
+        limits = _limits(config, bundle)
         rest_angles = np.clip(bundle.rest_angles, *limits.T)
         self.hands: dict[Side, LiveHand] = {
-            side: LiveHand(side, rest_angles, limits, telemetry) for side in SIDES if f"{side}_wrist" in config.wrists
+            side: LiveHand(bundle.hand, side, rest_angles, limits, telemetry)
+            for side in SIDES
+            if f"{side}_wrist" in config.wrists
         }
         self._telemetry = telemetry
         self._roles, self._timeline = BodyRoles(config), Timeline(look_ahead_s)
@@ -248,11 +251,12 @@ class Actor:
         return (tick.index - self._last[1]) * TICK_S
 
 
-def _limits(config: ActorConfig, limits: Array) -> Array:
-    """The model's limits `(20, 2)` in radians, narrowed as the actor's rig says."""
-    limits = limits.copy()
+def _limits(config: ActorConfig, bundle: Bundle) -> Array:
+    """The model's limits `(A, 2)` in radians, narrowed as the actor's rig says."""
+    limits = bundle.limits.copy()
     for name, ends in config.limits.items():
-        limits[DOF_NAMES.index(name)] = np.clip(ends, *limits[DOF_NAMES.index(name)])
+        angle = bundle.hand.angle_names.index(name)
+        limits[angle] = np.clip(ends, *limits[angle])
     return limits
 
 

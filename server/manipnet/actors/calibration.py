@@ -1,9 +1,9 @@
-"""Where a wrist frame sits on its tracked body, and how large the hands are, from hands shown on the calibration sheet.
+"""Calibrates where a wrist frame sits on its tracked body, and how large the hands are.
 
-A cluster's frame on a wrist is arbitrary, and nothing a cluster does alone tells where the wrist is in it; so the pose
-that is shown says where the wrist frame is *in the world*. Both hands lie flat on the sheet of `docs/calibration.md`,
-wrists on its two marks, fingers together along its two lines. Sheet frame: origin at its centre, +x to the
-operator's right, +y up out of the table, +z toward the operator. Pure functions, no I/O.
+The frame of a marker cluster on a wrist is arbitrary, and its motion alone does not tell where the wrist is in it.
+Therefore both hands are shown in a known pose: flat on the sheet of `docs/calibration.md`, wrists on its two marks,
+fingers together along its two lines. That gives the wrist frames in the world. Sheet frame: origin at the centre of the
+sheet, +x to the operator's right, +y up out of the table, +z toward the operator. Pure functions, no I/O.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ import numpy as np
 
 from manipnet.geometry import (
     Array,
+    Side,
     compose,
     invert,
     mirror_poses,
@@ -24,14 +25,13 @@ from manipnet.geometry import (
     quat_rotate,
     transform,
 )
-from manipnet.synthesis.synthesizer import Side
 
 HAND_LENGTH_M: Final = 0.219
-"""The model's hand, from the middle of the wrist to the tip of the middle finger."""
+"""Length of the model's hand, from the middle of the wrist to the tip of the middle finger."""
 WRIST_HEIGHT_M: Final = 0.025
-"""The middle of the model's wrist above a table that the hand lies on."""
+"""Height of the middle of the model's wrist above the table on which the hand lies."""
 MARK_M: Final = (0.12, 0.10)
-"""Where the wrists go: this far to either side of the sheet's centre, and this far toward the operator."""
+"""Place of the wrists: this far to either side of the sheet's centre, and this far toward the operator."""
 HAND_LENGTH_RANGE_M: Final = (0.12, 0.28)
 
 MIN_SAMPLES: Final = 20
@@ -40,22 +40,22 @@ OUTLIER_SHARE: Final = 0.2
 MAX_SPREAD_M, MAX_SPREAD_RAD = 0.003, np.radians(2.0)
 """RMS about the mean."""
 MAX_DRIFT_M, MAX_DRIFT_RAD = 0.003, np.radians(1.5)
-"""From the first third of the time to the last."""
+"""From the first third of the samples to the last."""
 GOOD_M, GOOD_RAD = 0.001, np.radians(0.5)
-"""Spread and drift up to which a calibration is called good; beyond it, fair."""
+"""A calibration is good up to this spread and drift, and fair beyond."""
 REACH_M: Final = 0.20
-"""A cluster sits no farther than this from the wrist it is for."""
+"""A cluster is at most this far from its wrist."""
 SIDEWAYS_M: Final = 0.03
-"""How far beside its line a fingertip may touch."""
+"""A fingertip may touch at most this far beside its line."""
 
 
 class CalibrationError(ValueError):
-    """What was shown cannot be used; the text says what was wrong and what to do."""
+    """The pose that was shown cannot be used; the text says what was wrong and what to do."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Steady:
-    """A body that was held still: its mean `pose (7,)`, and how still it was."""
+    """A body that was held still: its mean world `pose (7,)`, and how still it was."""
 
     pose: Array
     spread_m: float
@@ -67,46 +67,47 @@ class Steady:
 
     @property
     def good(self) -> bool:
-        """Whether a calibration from it is as good as any."""
+        """Whether a calibration from it is good, not only fair."""
         return max(self.spread_m, self.drift_m) <= GOOD_M and max(self.spread_rad, self.drift_rad) <= GOOD_RAD
 
 
 def steady_pose(poses: Array, name: str, expected: float = MIN_SAMPLES) -> Steady:
-    """Mean of the poses `(n, 7)` of the body `name`, rising in time, without those that do not belong.
+    """Mean of the world poses `(n, 7)` of the body `name`, oldest first, without outliers.
 
-    Raises `CalibrationError` for too few samples (of those `expected` in that time), too many outliers, and a body
-    that moved.
+    Raises `CalibrationError` if too few of the `expected` samples are there, if too many are outliers, and if the body
+    moved.
     """
     least = max(MIN_SAMPLES, int(TRACKED_SHARE * expected))
     if len(poses) < least:
         raise CalibrationError(
-            f"{name}: {len(poses)} tracked samples in that time, {least} are the least; see that it is tracked, and "
-            "hold it still for all of that time"
+            f"{name}: only {len(poses)} tracked samples in that time, and at least {least} are needed; "
+            "make sure that it is tracked, and hold it still all the time"
         )
     mean, kept = _robust_mean(poses)
     outliers = len(poses) - int(kept.sum())
     if outliers > OUTLIER_SHARE * len(poses):
         raise CalibrationError(
-            f"{name}: {outliers} of {len(poses)} samples are elsewhere than the rest; it moved, or its markers "
-            "flicker: hold still, and see its markers in the tracking software"
+            f"{name}: {outliers} of {len(poses)} samples are far from the others; it moved, or its markers flicker: "
+            "hold still, and check its markers in the tracking software"
         )
     steady = Steady(mean, *_spread(poses[kept], mean), *_drift(poses[kept]), len(poses), outliers)
     wanders = steady.drift_m > max(MAX_DRIFT_M, steady.spread_m)
     if wanders or steady.drift_rad > max(MAX_DRIFT_RAD, steady.spread_rad):
         raise CalibrationError(
-            f"{name} moved {_figure(steady.drift_m, steady.drift_rad)} while it was to be still, allowed are "
-            f"{_figure(MAX_DRIFT_M, MAX_DRIFT_RAD)}; lay the hand down and try again"
+            f"{name} moved by {_figure(steady.drift_m, steady.drift_rad)} while it had to be still; at most "
+            f"{_figure(MAX_DRIFT_M, MAX_DRIFT_RAD)} are allowed: lay the hand down and try again"
         )
     if steady.spread_m > MAX_SPREAD_M or steady.spread_rad > MAX_SPREAD_RAD:
         raise CalibrationError(
-            f"{name} trembles by {_figure(steady.spread_m, steady.spread_rad)} (RMS), allowed are "
-            f"{_figure(MAX_SPREAD_M, MAX_SPREAD_RAD)}; rest it on the table, and see the tracker's own residual"
+            f"{name} trembles by {_figure(steady.spread_m, steady.spread_rad)} (RMS); at most "
+            f"{_figure(MAX_SPREAD_M, MAX_SPREAD_RAD)} are allowed: rest it on the table, and check the residual "
+            "that the tracking software shows"
         )
     return steady
 
 
 def mean_pose(poses: Array) -> Array:
-    """Mean of poses `(n, 7)`: of the positions, and the rotation nearest to all of them (Markley et al. 2007)."""
+    """Mean position and mean rotation of poses `(n, 7)`; the rotation is the nearest to all (Markley et al. 2007)."""
     quats = poses[:, 3:]
     _, vectors = np.linalg.eigh(quats.T @ quats)
     q = vectors[:, -1]
@@ -114,21 +115,25 @@ def mean_pose(poses: Array) -> Array:
 
 
 def sheet_at(position: Array, yaw: float) -> Array:
-    """A sheet that lies at `position (3,)` in the world, turned about the vertical: `T_world_sheet (7,)`."""
+    """`T_world_sheet (7,)` of a sheet at `position (3,)` in the world, turned by `yaw` radians about the vertical."""
     return np.concatenate([position, quat_exp(np.array([0.0, yaw, 0.0]))])
 
 
 def sheet_under(T_world_object: Array, lowest_m: float) -> Array:
-    """`T_world_sheet (7,)` of a sheet under the middle of an object, its lines along the object's x axis, on a table
-    at the height `lowest_m`. Raises `CalibrationError` for an object whose x axis is not about level."""
+    """`T_world_sheet (7,)` of a sheet under the middle of an object, on a table at the height `lowest_m`.
+
+    Its lines are along the x axis of the object. Raises `CalibrationError` if that axis is far from level.
+    """
     x, y, z = quat_rotate(T_world_object[3:], np.array([1.0, 0.0, 0.0]))
     if abs(y) > 0.5:
-        raise CalibrationError("the reference object's x axis points up or down; put it with its x axis along the line")
+        raise CalibrationError(
+            "the x axis of the reference object points up or down; place the object with its x axis along the line"
+        )
     return sheet_at(np.array([T_world_object[0], lowest_m, T_world_object[2]]), float(np.arctan2(-z, x)))
 
 
 def wrist_on_sheet(side: Side, hand_scale: float = 1.0) -> Array:
-    """`T_sheet_wrist (7,)` of a hand in the shown pose: flat, wrist on its mark, fingers away from the operator."""
+    """`T_sheet_wrist (7,)` of a hand in the pose to show: flat, wrist on its mark, fingers away from the operator."""
     x, z = MARK_M
     # columns: the wrist's x axis (fingers) to -z, its y axis (thumb) to -x, its z axis (back of the hand) to +y
     right = np.array([x, WRIST_HEIGHT_M * hand_scale, z, -0.5, 0.5, 0.5, 0.5])
@@ -138,7 +143,7 @@ def wrist_on_sheet(side: Side, hand_scale: float = 1.0) -> Array:
 def calibrate_wrist(side: Side, cluster: Steady, T_world_sheet: Array, hand_scale: float) -> Array:
     """`T_cluster_wrist (7,)` of a hand that was shown on the sheet.
 
-    Raises `CalibrationError` when the cluster is nowhere near its mark.
+    Raises `CalibrationError` if the cluster is far from its mark.
     """
     T_sheet_cluster = compose(invert(T_world_sheet), cluster.pose)
     T_sheet_wrist = wrist_on_sheet(side, hand_scale)
@@ -149,25 +154,26 @@ def calibrate_wrist(side: Side, cluster: Steady, T_world_sheet: Array, hand_scal
         remedy = (
             f"it is at the {other} hand's mark: swap the two bodies in the rig, or the hands"
             if crossed
-            else "see where the sheet lies and which body is which (`manipnet doctor`)"
+            else "check where the sheet lies and which body is which (`manipnet doctor`)"
         )
         raise CalibrationError(
-            f"the body of {side}_wrist is {off_m:.2f} m from the {side} wrist's mark, at most {REACH_M:.2f} m; {remedy}"
+            f"the body of {side}_wrist is {off_m:.2f} m from the {side} wrist's mark; "
+            f"at most {REACH_M:.2f} m are allowed: {remedy}"
         )
     offset = compose(invert(T_sheet_cluster), T_sheet_wrist)
     return np.concatenate([offset[:3], quat_normalize(offset[3:])])
 
 
 def scaled_offset(T_cluster_wrist: Array, scale_before: float, scale: float) -> Array:
-    """The same offset for hands found to be of another size: a thicker wrist's middle lies higher."""
+    """The same offset for hands of another size, because the middle of a thicker wrist is higher."""
     higher = np.array([0.0, 0.0, WRIST_HEIGHT_M * (scale - scale_before), 0.0, 0.0, 0.0, 1.0])
     return compose(T_cluster_wrist, higher)
 
 
 def measured_length(side: Side, T_world_wrist: Array, T_world_sheet: Array) -> float:
-    """Length of a hand whose middle finger's tip touches its line's end at the sheet's centre line, metres.
+    """Length in metres of a hand whose middle fingertip touches the end of its line, at the sheet's centre line.
 
-    `T_world_wrist (7,)` is the calibrated wrist. Raises `CalibrationError` where that cannot be.
+    `T_world_wrist (7,)` is the calibrated wrist. Raises `CalibrationError` for an impossible length or direction.
     """
     T_sheet_wrist = compose(invert(T_world_sheet), T_world_wrist)
     mark_x = MARK_M[0] if side == "right" else -MARK_M[0]
@@ -180,36 +186,39 @@ def measured_length(side: Side, T_world_wrist: Array, T_world_sheet: Array) -> f
     beside_m = float(np.linalg.norm(to_mark * flat - heading * (heading @ to_mark)))
     if not HAND_LENGTH_RANGE_M[0] <= length <= HAND_LENGTH_RANGE_M[1] or heading @ to_mark < 0.0:
         raise CalibrationError(
-            f"the {side} wrist is {length:.3f} m from the mark its middle finger should touch, allowed are "
-            f"{HAND_LENGTH_RANGE_M[0]} … {HAND_LENGTH_RANGE_M[1]} m; touch the centre line with straight fingers"
+            f"the {side} wrist is {length:.3f} m from the mark that its middle finger should touch; allowed are "
+            f"{HAND_LENGTH_RANGE_M[0]} … {HAND_LENGTH_RANGE_M[1]} m: touch the centre line with straight fingers"
         )
     if beside_m > SIDEWAYS_M:
         raise CalibrationError(
-            f"the {side} middle finger points {100 * beside_m:.0f} cm beside its mark, at most "
-            f"{100 * SIDEWAYS_M:.0f} cm; calibrate the wrists first, then touch it with a straight middle finger"
+            f"the {side} middle finger points {100 * beside_m:.0f} cm beside its mark; at most "
+            f"{100 * SIDEWAYS_M:.0f} cm are allowed: calibrate the wrists first, then touch the mark with a straight "
+            "middle finger"
         )
     return length
 
 
 def upright_on_sheet(T_world_sheet: Array, lowest_y_m: float) -> Array:
-    """`T_world_object (7,)` of an object that stands on the sheet's centre, its axes along the sheet's; its mesh
-    reaches down to `lowest_y_m` in its own frame."""
+    """`T_world_object (7,)` of an object that stands on the centre of the sheet, its axes along the sheet's.
+
+    Its mesh reaches down to `lowest_y_m` in its own frame.
+    """
     return compose(T_world_sheet, np.array([0.0, -lowest_y_m, 0.0, 0.0, 0.0, 0.0, 1.0]))
 
 
 def difference(T_a: Array, T_b: Array) -> tuple[float, float]:
-    """How far two poses `(7,)` are apart: metres, radians."""
+    """Distance of two poses `(7,)` in metres and in radians."""
     turn = quat_log(quat_multiply(quat_conjugate(T_a[3:]), T_b[3:]))
     return float(np.linalg.norm(T_a[:3] - T_b[:3])), float(np.linalg.norm(turn))
 
 
 def lowest_point(vertices: Array, T_world_object: Array) -> float:
-    """Height of the lowest of `vertices (V, 3)`, metres."""
+    """Height in metres of the lowest of `vertices (V, 3)`, which are given in the object's frame."""
     return float(transform(T_world_object, vertices)[:, 1].min())
 
 
 def _robust_mean(poses: Array) -> tuple[Array, np.ndarray]:
-    """The mean of the samples that agree, and which those are `(n,)`."""
+    """The mean of the samples that agree, and a mask `(n,)` of them."""
     middle = np.concatenate([np.median(poses[:, :3], axis=0), _middle_rotation(poses[:, 3:])])
     for _ in range(3):
         kept = np.ones(len(poses), dtype=bool)
@@ -220,7 +229,7 @@ def _robust_mean(poses: Array) -> tuple[Array, np.ndarray]:
 
 
 def _middle_rotation(quats: Array) -> Array:
-    """The one of up to 64 of the rotations that is nearest to all of them."""
+    """Of up to 64 of the rotations, the one that is nearest to all."""
     some = quats[:: max(len(quats) // 64, 1)]
     return some[np.argmax(np.abs(some @ quats.T).sum(axis=1))]
 

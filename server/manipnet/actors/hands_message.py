@@ -6,6 +6,7 @@ import numpy as np
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.transitions import HOLD_AFTER_S, ShownHand
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.tracking.tick import Tick
 from manipnet.wire import BodyPose, HandPose, HandsMessage, Latency, Side
@@ -27,7 +28,7 @@ def hands_message(
         t_capture=tick.time_s,
         t_publish=t_publish,
         look_ahead=tick.look_ahead_s,
-        hands=hand_poses(hands, actor.config.hand_scale),
+        hands=hand_poses(actor.model_hand, hands, actor.config.hand_scale),
         bodies=tuple(
             BodyPose(body.age_s <= HOLD_AFTER_S, body.pose, name) for name, body in sorted(tick.bodies.items())
         ),
@@ -37,13 +38,13 @@ def hands_message(
     return message
 
 
-def hand_poses(hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, HandPose]:
-    """Each hand with its joints in the world; `scale` is the size of the hands relative to the model's."""
+def hand_poses(model: Hand, hands: Mapping[Side, ShownHand], scale: float) -> dict[Side, HandPose]:
+    """Each hand with its joints in the world; `scale` is the size of the hands relative to the `model` hand's."""
     if not hands:
         return {}
     angles = np.array([hand.angles for hand in hands.values()])
     wrists = np.array([hand.wrist for hand in hands.values()])
-    rotations, joints = pose_in_world(list(hands), angles, wrists, scale)
+    rotations, joints = pose_in_world(model, list(hands), angles, wrists, scale)
     return {
         side: HandPose(
             state=hand.state,

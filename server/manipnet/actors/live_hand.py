@@ -7,6 +7,7 @@ import numpy as np
 from manipnet.actors.output_guard import OutputGuard
 from manipnet.actors.transitions import PoseTransition, ShownHand
 from manipnet.geometry import Array
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.synthesizer import HandStep, state_of
 from manipnet.telemetry import Telemetry
 from manipnet.wire import Side, State
@@ -18,16 +19,16 @@ AT_REST_RAD: Final = 0.03
 class LiveHand:
     """The state of one hand between ticks."""
 
-    def __init__(self, side: Side, rest_angles: Array, limits: Array, telemetry: Telemetry) -> None:
-        """`rest_angles (20,)` and `limits (20, 2)` are in radians."""
+    def __init__(self, hand: Hand, side: Side, rest_angles: Array, limits: Array, telemetry: Telemetry) -> None:
+        """`hand` is the model's; `rest_angles (A,)` and `limits (A, 2)` are in radians."""
         self.side: Side = side
         self.prop: str | None = None
         """The prop to which the fingers belong, by name."""
         self.resting = False
         """Whether the hand was asked to rest: it is not synthesised until it has reached the rest pose."""
-        self.state = state_of(rest_angles)
+        self.state = state_of(hand, rest_angles)
         """What the next synthesis starts from."""
-        self._rest_angles = rest_angles
+        self._hand, self._rest_angles = hand, rest_angles
         self._transition = PoseTransition(rest_angles, OutputGuard(limits, telemetry))
 
     @property
@@ -51,12 +52,12 @@ class LiveHand:
         if step is not None:
             self.state = step.state
         elif state == "rest":
-            self.state = state_of(self._rest_angles)
+            self.state = state_of(self._hand, self._rest_angles)
         return shown
 
     def recover(self) -> None:
         """Let synthesis start from what is shown, after an error that may have spoiled the state."""
-        self.state = state_of(self._rest_angles if self.shown is None else self.shown.angles)
+        self.state = state_of(self._hand, self._rest_angles if self.shown is None else self.shown.angles)
 
     def at_rest(self) -> bool:
         """Whether the fingers have reached the rest pose."""

@@ -3,11 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from manipnet.actors.props import Prop
 from manipnet.actors.transitions import HOLD_AFTER_S
-from manipnet.geometry import Array
+from manipnet.geometry import Array, scale_positions
 from manipnet.synthesis.synthesizer import HandScene, HandState, HandStep, Synthesizer
 from manipnet.tracking.tick import BodyAtTick, Tick
 from manipnet.wire import Side, State
@@ -57,4 +55,4 @@ def make_scene(
 
 
 def _shrunk(window: Array, hand_scale: float) -> Array:
-    return window if hand_scale == 1.0 else window * np.append(np.full(3, 1.0 / hand_scale), np.ones(4))
+    return window if hand_scale == 1.0 else scale_positions(window, 1.0 / hand_scale)

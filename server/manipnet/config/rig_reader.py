@@ -12,9 +12,9 @@ import numpy as np
 from manipnet.common.options import ConfigError, shorten
 from manipnet.config.settings import SCALE_RANGE, WRISTS, ActorConfig, BodyConfig, ObjectConfig, all_options
 from manipnet.config.toml_source import Place, read_tree
-from manipnet.synthesis.hand.skeleton import DOF_NAMES
 from manipnet.synthesis.objects.library import library_file, library_names
 from manipnet.synthesis.objects.units import UNITS_M
+from manipnet.wire.hand_names import ANGLE_NAMES
 
 if TYPE_CHECKING:
     from manipnet.geometry import Array
@@ -117,7 +117,7 @@ class _Reader:
 
     def _limits(self, value: Any, at: Place) -> dict[str, tuple[float, float]]:
         at = (*at, "limits_deg")
-        self._known(self._table(value, at), at, DOF_NAMES)
+        self._known(self._table(value, at), at, ANGLE_NAMES)
         limits: dict[str, tuple[float, float]] = {}
         for name, ends in value.items():
             low, high = self._numbers(ends, 2, (*at, name))

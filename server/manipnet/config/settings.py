@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from manipnet import inputs, outputs
 from manipnet.common.options import (
@@ -23,6 +23,7 @@ from manipnet.common.options import (
     options_of,
 )
 from manipnet.net.addresses import is_loopback
+from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER, SOLVERS
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S, PROVIDERS, Provider
 from manipnet.synthesis.objects.library import library_file
 from manipnet.synthesis.objects.units import UNITS_M
@@ -38,9 +39,6 @@ MAX_ACTORS: Final = 16
 MAX_OBJECTS: Final = 32
 SCALE_RANGE: Final = (0.2, 5.0)
 """Allowed scale factors of a hand."""
-
-SolverName = Literal["least_squares", "ccd", "none"]
-SOLVERS: Final = ("least_squares", "ccd", "none")
 
 TRACKED: Final = "what is tracked"
 SYNTHESIS: Final = "how the fingers are synthesised"
@@ -80,7 +78,7 @@ class ActorConfig:
     objects: tuple[ObjectConfig, ...] = ()
     hand_scale: float = 1.0
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Lower and upper limit, in radians, of angles named in `skeleton.DOF_NAMES`; they narrow the model's limits."""
+    """Lower and upper limit, in radians, of some of `wire.hand_names.ANGLE_NAMES`; they narrow the model's limits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,8 +100,11 @@ class ServerConfig:
     provider: Provider = option(
         "auto", Choice(PROVIDERS), "what the network runs on; auto takes a GPU if one can be used", group=SYNTHESIS
     )
-    solver: SolverName = option(
-        "least_squares", Choice(SOLVERS), "inverse kinematics that corrects the contacts", group=SYNTHESIS
+    solver: str = option(
+        DEFAULT_SOLVER,
+        Choice(tuple(SOLVERS)),
+        "inverse kinematics that corrects the contacts: " + ", ".join(f"{s.name} ({s.help})" for s in SOLVERS.values()),
+        group=SYNTHESIS,
     )
     look_ahead_s: float = option(
         MAX_LOOK_AHEAD_S,

@@ -7,11 +7,12 @@ from typing import Any, Final
 import zmq
 
 from manipnet.common.options import parse_endpoint
+from manipnet.config.settings import all_options
 from manipnet.control.request import RequestError
 from manipnet.net.curve_keys import read_client_keys
-from manipnet.net.zap import secure_client
+from manipnet.net.zmq_socket import connect, tcp_address
 
-CONTROL_PORT: Final = 5557
+CONTROL_PORT: Final = all_options()["control_port"].default
 ANSWER_S: Final = 10.0
 
 
@@ -23,15 +24,14 @@ class ControlClient:
 
         Raises `ConfigError` for a malformed address and `KeyFileError` for a malformed key file.
         """
-        self._host, self._port = parse_endpoint(address.removeprefix("tcp://"), CONTROL_PORT)
+        self._endpoint = parse_endpoint(address.removeprefix("tcp://"), CONTROL_PORT)
         self._keys = None if keys is None else read_client_keys(keys)
         self._timeout_s = timeout_s
 
     @property
     def address(self) -> str:
         """The server's address, `tcp://HOST:PORT`."""
-        host = f"[{self._host}]" if ":" in self._host else self._host
-        return f"tcp://{host}:{self._port}"
+        return tcp_address(self._endpoint)
 
     def ask(self, op: str, **fields: Any) -> dict[str, Any]:
         """Send the request `op` with its `fields`, as docs/protocol.md lists them, and return the answer.
@@ -45,19 +45,17 @@ class ControlClient:
         return answer
 
     def _exchange(self, request: bytes) -> dict[str, Any]:
-        with zmq.Context() as context, context.socket(zmq.REQ) as socket:
-            socket.setsockopt(zmq.LINGER, 0)
-            socket.setsockopt(zmq.IPV6, int(":" in self._host))
-            if self._keys is not None:
-                secure_client(socket, self._keys)
+        with zmq.Context() as context:
             try:
-                socket.connect(self.address)
+                # An answer with a mesh may have any size.
+                socket = connect(context, zmq.REQ, self._endpoint, self._keys, max_bytes=-1)
             except zmq.ZMQError as error:
                 raise ConnectionError(f"cannot connect to {self.address}: {error}") from None
-            socket.send(request)
-            if not socket.poll(int(1e3 * self._timeout_s)):
-                raise TimeoutError(f"no server answers at {self.address} within {self._timeout_s:g} s")
-            return self._decoded(socket.recv())
+            with socket:
+                socket.send(request)
+                if not socket.poll(int(1e3 * self._timeout_s)):
+                    raise TimeoutError(f"no server answers at {self.address} within {self._timeout_s:g} s")
+                return self._decoded(socket.recv())
 
     def _decoded(self, payload: bytes) -> dict[str, Any]:
         try:

@@ -14,8 +14,6 @@ from manipnet.control.request import Handler, Request, RequestError, body_key, c
 from manipnet.geometry import Array
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
-from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import MeshError
@@ -23,6 +21,7 @@ from manipnet.synthesis.objects.units import UNITS_M
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import VERSION
+from manipnet.wire.hand_names import ANGLE_NAMES, JOINT_NAMES, OPENXR_JOINT_NAMES
 
 MAX_PATH: Final = 1024
 
@@ -62,7 +61,7 @@ class SessionRequests:
             "tick_hz": TICK_HZ,
             "actors": [actor.config.name for actor in self._actors],
             "joint_names": list(JOINT_NAMES),
-            "angle_names": list(DOF_NAMES),
+            "angle_names": list(ANGLE_NAMES),
             "openxr_joint_names": list(OPENXR_JOINT_NAMES),
             "objects": list(self._catalog.names()),
         }

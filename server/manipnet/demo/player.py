@@ -1,4 +1,4 @@
-"""`manipnet-serve --demo`: a recorded performance, played for ever through the server's own bodies socket."""
+"""`manipnet-serve --demo`: a recorded performance, played again and again through the server's own bodies socket."""
 
 import ipaddress
 import logging
@@ -13,27 +13,27 @@ from manipnet.recording.mcap_file import RecordingError, read_bodies
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 
 DEMO_FILE: Final = Path(__file__).with_name("demo.mcap")
-"""Made by `python -m manipnet_tools.assets.demo_recording`. It ends in the pose it begins with."""
+"""Made by `python -m manipnet_tools.assets.demo_recording`. It ends in the pose in which it begins."""
 DEMO_OBJECTS: Final = ("cube", "cylinder", "mug")
-"""Bodies of the recording besides the wrists, each a mesh of the library."""
+"""The props of the recording; each carries the library's mesh of the same name."""
 
 _log = logging.getLogger(__name__)
 
 
-def demo_objects(others: tuple[ObjectConfig, ...] = ()) -> tuple[ObjectConfig, ...]:
-    """The props of the performance, with meshes of the library or with the `others` of the same name.
+def demo_objects(replacements: tuple[ObjectConfig, ...] = ()) -> tuple[ObjectConfig, ...]:
+    """The props of the performance, with meshes of the library or the `replacements` of the same name.
 
-    Raises `ConfigError` for one of the others that the performance does not have.
+    Raises `ConfigError` for a replacement of a prop that the performance does not have.
     """
-    given = {thing.name: thing for thing in others}
+    given = {prop.name: prop for prop in replacements}
     if unknown := given.keys() - set(DEMO_OBJECTS):
         raise ConfigError(f"--mesh {min(unknown)}=…: with --demo the bodies are {', '.join(DEMO_OBJECTS)}")
-    own = {name: ObjectConfig(name, BodyConfig(name), LIBRARY_FOLDER / f"{name}.ply") for name in DEMO_OBJECTS}
-    return tuple((own | given).values())
+    library = {name: ObjectConfig(name, BodyConfig(name), LIBRARY_FOLDER / f"{name}.ply") for name in DEMO_OBJECTS}
+    return tuple((library | given).values())
 
 
 class Demo:
-    """Plays the performance from `start` to `stop`, in a thread of its own."""
+    """Plays the performance from `start` to `stop`, on a thread of its own."""
 
     def __init__(self, path: Path = DEMO_FILE) -> None:
         """Raises `ConfigError` for a recording that cannot be read."""
@@ -45,13 +45,13 @@ class Demo:
         self._thread: threading.Thread | None = None
 
     def start(self, address: str) -> None:
-        """Play into the socket bound to `tcp://HOST:PORT`."""
+        """Begin to play into the socket that is bound to `tcp://HOST:PORT`."""
         host, port = connectable(address)
         self._thread = threading.Thread(target=self._run, args=(host, port), name="demo", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop playing; harmless when not started."""
+        """Stop playing; does nothing if it was not started."""
         self._stopping.set()
         if self._thread is not None:
             self._thread.join()
@@ -72,7 +72,7 @@ class Demo:
 
 
 def connectable(address: str) -> tuple[str, int]:
-    """Host and port to reach a socket bound to `tcp://HOST:PORT` from this machine; HOST may stand for all."""
+    """Host and port at which this machine reaches a socket bound to `tcp://HOST:PORT`, where HOST may mean all."""
     host, _, port = address.removeprefix("tcp://").rpartition(":")
     ip = ipaddress.ip_address(host.strip("[]"))
     if ip.is_unspecified:

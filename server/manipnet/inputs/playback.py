@@ -3,7 +3,6 @@
 Deadlines are absolute, so delays do not add up, and no frame is sent before the receiver listens.
 """
 
-import ipaddress
 import socket
 import threading
 import time
@@ -16,10 +15,14 @@ import msgpack
 import zmq
 
 from manipnet.inputs.osc.writer import osc_datagrams
+from manipnet.net.zmq_socket import connect, tcp_address
 from manipnet.wire.bodies import BodyFrame, bodies_map
 
 CONNECT_S: Final = 10.0
 """How long to wait for a receiver to answer, or to read on when it has fallen behind."""
+
+WAITING_FRAMES: Final = 1_000
+"""Frames that may wait for a receiver that has fallen behind."""
 
 
 class PlayError(OSError):
@@ -43,22 +46,21 @@ class ZmqBodySender:
         Raises `PlayError` if it has not within `CONNECT_S`, or when `stopping` is set.
         """
         self._context = zmq.Context()
-        # XPUB also receives the subscriptions. What is sent before the first one would be lost.
-        self._socket = self._context.socket(zmq.XPUB)
+        address = tcp_address((host, port))
+        try:
+            # XPUB also receives the subscriptions. What is sent before the first one would be lost.
+            self._socket = connect(self._context, zmq.XPUB, (host, port), high_water_mark=WAITING_FRAMES)
+        except zmq.ZMQError as error:
+            self._context.term()
+            raise PlayError(f"cannot connect to {address}: {zmq.strerror(error.errno or 0)}") from None
         self._socket.setsockopt(zmq.LINGER, 1_000)
         self._socket.setsockopt(zmq.XPUB_NODROP, 1)
         self._socket.setsockopt(zmq.SNDTIMEO, int(1e3 * CONNECT_S))
-        self._socket.setsockopt(zmq.IPV6, int(":" in host))
-        address = f"tcp://{_bracketed(host)}:{port}"
         try:
-            self._socket.connect(address)
             if not self._subscribed(stopping):
                 raise PlayError(
                     f"nothing receives bodies at {address}; is the server running, and is that its --input-port?"
                 )
-        except zmq.ZMQError as error:
-            self.close()
-            raise PlayError(f"cannot connect to {address}: {zmq.strerror(error.errno or 0)}") from None
         except BaseException:
             self.close()
             raise
@@ -159,10 +161,3 @@ def looped(frames: Sequence[BodyFrame]) -> Iterator[BodyFrame]:
             yield replace(frame, t_s=frame.t_s + shift_s, frame=number)
             number += 1
         shift_s += length_s
-
-
-def _bracketed(host: str) -> str:
-    try:
-        return f"[{host}]" if ipaddress.ip_address(host).version == 6 else host
-    except ValueError:
-        return host

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 from websockets.asyncio.server import ServerConnection
@@ -23,9 +24,10 @@ class HalfOpen:
         self._refuse, self._most = refuse, most
         self._waiting: dict[_Connection, None] = {}
 
-    def connection(self, *arguments: Any, **options: Any) -> ServerConnection:
-        """Make a connection; this is what `websockets.serve` takes as `create_connection`."""
-        return _Connection(self, *arguments, **options)
+    @property
+    def connection(self) -> Any:
+        """Makes a `ServerConnection`: what `websockets.serve` takes as `create_connection`."""
+        return partial(_Connection, self)
 
     def opened(self, connection: "_Connection") -> None:
         """Note a connection that was accepted, and close another one if there are too many."""
@@ -71,7 +73,9 @@ class _ShortLog(logging.Filter):
         if record.exc_info is None or record.msg != "opening handshake failed":
             return True
         error = record.exc_info[1]
-        if isinstance(error, EOFError | ConnectionError) or isinstance(error.__cause__, EOFError | ConnectionError):
+        if isinstance(error, EOFError | ConnectionError) or isinstance(
+            getattr(error, "__cause__", None), EOFError | ConnectionError
+        ):
             return False  # the client has gone
         record.msg, record.args, record.exc_info = "refused a connection: %s", (error,), None
         record.levelno, record.levelname = logging.WARNING, "WARNING"

@@ -1,4 +1,4 @@
-"""Threads that receive: an error costs one message, or a pause before the socket is opened again, but not the thread."""
+"""Threads that receive: an error costs one message, or a pause until the socket is open again, but not the thread."""
 
 import logging
 import threading

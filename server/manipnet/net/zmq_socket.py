@@ -84,16 +84,34 @@ class BoundSocket:
 
 
 def connect(
-    context: zmq.Context, kind: zmq.SocketType, endpoint: Endpoint, keys: ClientKeys | None = None
+    context: zmq.Context,
+    kind: zmq.SocketType,
+    endpoint: Endpoint,
+    keys: ClientKeys | None = None,
+    *,
+    high_water_mark: int = HIGH_WATER_MARK,
+    max_bytes: int = MAX_WIRE_BYTES,
 ) -> zmq.Socket:
-    """A client's socket that connects to a socket of the server; `keys` are needed where the server asks for them."""
-    host, port = endpoint
+    """A client's socket that connects to a socket of the server; `keys` are needed if the server asks for them.
+
+    A `high_water_mark` of 0 and `max_bytes` of -1 mean no limit. Raises `zmq.ZMQError` for an impossible endpoint.
+    """
     client: zmq.Socket = context.socket(kind)
-    _limit(client, MAX_WIRE_BYTES, ipv6=":" in host)
-    if keys is not None:
-        secure_client(client, keys)
-    client.connect(f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
+    _limit(client, max_bytes, ipv6=":" in endpoint[0], high_water_mark=high_water_mark)
+    try:
+        if keys is not None:
+            secure_client(client, keys)
+        client.connect(tcp_address(endpoint))
+    except BaseException:
+        client.close()
+        raise
     return client
+
+
+def tcp_address(endpoint: Endpoint) -> str:
+    """`tcp://HOST:PORT`, with an IPv6 address in brackets."""
+    host, port = endpoint
+    return f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
 
 
 def zmq_endpoint(host: str, port: int) -> tuple[str, bool]:
@@ -105,15 +123,14 @@ def zmq_endpoint(host: str, port: int) -> tuple[str, bool]:
             address = ipaddress.ip_address(socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][4][0])
         except (OSError, UnicodeError) as error:
             raise ListenError(f"cannot listen on host {host!r}: {error}; use an address of this machine") from None
-    is_v6 = address.version == 6
-    return (f"tcp://[{address}]:{port}" if is_v6 else f"tcp://{address}:{port}"), is_v6
+    return tcp_address((str(address), port)), address.version == 6
 
 
-def _limit(limited: zmq.Socket, max_bytes: int, ipv6: bool) -> None:
+def _limit(limited: zmq.Socket, max_bytes: int, ipv6: bool, high_water_mark: int = HIGH_WATER_MARK) -> None:
     """Replace ZeroMQ's defaults: messages of any size, no heartbeats, and a close that waits without end."""
     limited.setsockopt(zmq.LINGER, 0)
-    limited.setsockopt(zmq.SNDHWM, HIGH_WATER_MARK)
-    limited.setsockopt(zmq.RCVHWM, HIGH_WATER_MARK)
+    limited.setsockopt(zmq.SNDHWM, high_water_mark)
+    limited.setsockopt(zmq.RCVHWM, high_water_mark)
     limited.setsockopt(zmq.MAXMSGSIZE, max_bytes)
     limited.setsockopt(zmq.HEARTBEAT_IVL, HEARTBEAT_MS)
     limited.setsockopt(zmq.HEARTBEAT_TIMEOUT, HEARTBEAT_TIMEOUT_MS)

@@ -12,6 +12,7 @@ from manipnet.common.options import Protocol
 
 if TYPE_CHECKING:
     from manipnet.net.curve_keys import ServerKeys
+    from manipnet.synthesis.hand.hand import Hand
     from manipnet.telemetry import Telemetry
     from manipnet.wire import HandsMessage
 
@@ -21,6 +22,8 @@ class Emission:
     """What every output needs of the server."""
 
     telemetry: "Telemetry"
+    hand: "Hand"
+    """The hand that the messages describe."""
     host: str = "127.0.0.1"
     """The address of this machine to listen on."""
     keys: "ServerKeys | None" = None

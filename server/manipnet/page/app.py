@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Final
 
 import viser
@@ -16,21 +17,23 @@ from manipnet.page.panel import Panel
 from manipnet.page.rpc import RefusedError, RpcClient, RpcLog
 from manipnet.page.show import Show
 from manipnet.page.web_server import OPERATOR, open_server
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.hand_file import read_hand
 
 REFRESH_S: Final = 0.5
 NICE: Final = 10
 """The page has a lower priority than the server's ticks, which matters on a machine without a spare processor."""
 
 
-def serve(listener: socket.socket, connection: Connection) -> None:
-    """Serve the page until the server ends, however it ends."""
+def serve(listener: socket.socket, connection: Connection, hand_file: Path) -> None:
+    """Serve the page until the server ends, however it ends. `hand_file` describes the hand that is shown."""
     if hasattr(os, "nice"):
         os.nice(NICE)
     sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (viser prints there, but it is the server's)
     link = RpcClient(connection)
     logging.basicConfig(level=logging.WARNING, handlers=[RpcLog(link)], force=True)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a visitor who leaves is not worth a log line
-    page = Page(link)
+    page = Page(link, read_hand(hand_file))
     page.open(open_server(listener, "ManipNet Live", page.dropped))
     threading.Thread(target=page.refresh, name="refresh", daemon=True).start()
     page.run()
@@ -40,13 +43,13 @@ def serve(listener: socket.socket, connection: Connection) -> None:
 class Page:
     """One show for everybody, and a panel for each visitor."""
 
-    def __init__(self, link: RpcClient) -> None:
-        self._link = link
+    def __init__(self, link: RpcClient, hand: Hand) -> None:
+        self._link, self._hand = link, hand
         self._panels: dict[int, Panel] = {}
 
     def open(self, server: viser.ViserServer) -> None:
         """Set up the scene and let visitors in."""
-        self._show = Show(server, self._follow)
+        self._show = Show(server, self._hand, self._follow)
         server.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, brand_color=(88, 166, 255), control_width="medium"
         )
@@ -66,9 +69,9 @@ class Page:
         """Import a mesh file that was dropped on the page; returns the message for its visitor."""
         panel = next((panel for panel in self._panels.values() if panel.objects is not None), None)
         if panel is None or panel.objects is None:
-            return "nobody is here who may bring in files"
+            return "only a browser on the server's own machine may import files, and none is open"
         try:
-            return panel.objects.bring_in(name, content)
+            return panel.objects.import_mesh(name, content)
         except (RefusedError, ValueError, OSError) as error:
             return str(error)
 

@@ -1,4 +1,4 @@
-"""What the last half minute was like: rate, delay and the stages of each tick."""
+"""Charts of the last half minute: rate, delay and the stages of each tick."""
 
 from collections import deque
 from typing import Final
@@ -13,13 +13,13 @@ SPAN_S: Final = 30.0
 STEP_S: Final = 0.2
 _COLUMNS: Final = ("t", "rate", "total", "sense", "infer", "ik")
 _EMPTY: Final = np.array([-SPAN_S, 0.0])
-"""The charts' span before there is anything in it; a span of nothing would keep the browser busy for ever."""
+"""The time span of an empty chart; a span of zero would keep the browser busy forever."""
 _INK: Final = "rgba(150,160,175,0.9)"
 _GRID: Final = {"stroke": "rgba(150,160,175,0.18)", "width": 1}
 
 
 class History:
-    """A row every `STEP_S` seconds of what messages say about themselves."""
+    """One row of measurements for every `STEP_S` seconds, taken from the messages."""
 
     def __init__(self) -> None:
         self._rows: deque[tuple[float, ...]] = deque(maxlen=int(SPAN_S / STEP_S))
@@ -28,11 +28,11 @@ class History:
 
     @property
     def rate_hz(self) -> float:
-        """The newest rate; zero before there is one."""
+        """The newest rate; zero before the first row."""
         return self._rows[-1][1] if self._rows else 0.0
 
     def note(self, message: HandsMessage) -> None:
-        """Take one message of the actor."""
+        """Add one message of the actor."""
         last, latency = self._last, message.latency_ms
         if last is None or last.session != message.session or message.seq < last.seq:
             self._last, self._latencies = message, []
@@ -46,7 +46,7 @@ class History:
             self._last, self._latencies = message, []
 
     def columns(self) -> dict[str, Array]:
-        """`{name: (n,)}`; `t` counts back from now, seconds, all others are the worst of their step."""
+        """`{name: (n,)}`: `t` is the time before now in seconds, and the others are the worst values of each step."""
         if len(self._rows) < 2:
             return dict(zip(_COLUMNS, (_EMPTY, *[np.zeros(2)] * (len(_COLUMNS) - 1)), strict=True))
         rows = np.array(self._rows)
@@ -64,7 +64,7 @@ class Plots:
         self._stages = _chart(gui, "Stages, ms", colors)
 
     def show(self, history: History) -> None:
-        """As of now."""
+        """Draw the newest rows."""
         columns = history.columns()
         self._rate.data = (columns["t"], columns["rate"])
         self._delay.data = (columns["t"], columns["total"])

@@ -1,4 +1,4 @@
-"""Arrows and rings on a prop in the scene of one visitor: dragged, they say where its mesh sits on its body."""
+"""Arrows and rings in the scene of one visitor; dragging them moves the mesh of a prop on its body."""
 
 import asyncio
 from collections.abc import Callable
@@ -15,17 +15,17 @@ Moved = Callable[[Array, bool], None]
 
 
 class Gizmo:
-    """They hang on the body, so where they are on it is where the mesh is to sit."""
+    """The gizmo is attached to the body, so its pose on the body is the offset of the mesh."""
 
     def __init__(self, scene: viser.SceneApi, moved: Moved) -> None:
-        """`moved` hears of each new T_body_prop `(7,)`, and whether it is the last one of a drag; one at a time."""
+        """`moved` is called with each new T_body_prop `(7,)` and whether the drag has ended, one call at a time."""
         self._body = scene.add_frame("/placing", show_axes=False, visible=False)
         self._grips = scene.add_transform_controls("/placing/handles", SIZE_M, depth_test=False, opacity=0.8)
         self._moved, self._held, self._telling = moved, False, asyncio.Lock()
         self._grips.on_update(self._dragged)
 
     def follow(self, T_world_prop: Array | None, offset: Array | None) -> None:
-        """Be where a prop is `(7,)` that sits at `offset (7,)` on its body; out of sight without."""
+        """Follow a body's pose `(7,)` with the prop's `offset (7,)` on it; None hides the gizmo."""
         self._body.visible = T_world_prop is not None and offset is not None
         if T_world_prop is None or offset is None:
             return
@@ -35,7 +35,7 @@ class Gizmo:
             self._grips.position, self._grips.wxyz = offset[:3], wxyz(offset[3:])
 
     async def _dragged(self, event: viser.TransformControlsEvent) -> None:
-        """On the page's event loop, in the order of the hand; what comes while an answer is awaited is left out."""
+        """Handle one drag event on the page's event loop; events that arrive while an answer is awaited are skipped."""
         self._held = event.phase != "end"
         if event.phase == "start" or (self._held and self._telling.locked()):
             return

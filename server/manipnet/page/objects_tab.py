@@ -1,4 +1,4 @@
-"""The tab in which props are chosen, sized, placed and brought in."""
+"""The tab that selects, scales, places and imports the objects of the props."""
 
 import tempfile
 from pathlib import Path
@@ -19,28 +19,34 @@ NONES: Final[tuple[str, ...]] = ("none",)
 
 
 class ObjectsTab:
-    """Which body carries what, how large, and where on it."""
+    """Lets an operator choose the object of each body, its size, and where it sits on the body."""
 
     def __init__(self, ask: Ask, client: viser.ClientHandle, perform: Perform) -> None:
         self._ask, self._perform, gui = ask, perform, client.gui
-        self._handles = Gizmo(client.scene, self._drag)
+        self._gizmo = Gizmo(client.scene, self._drag)
         self._carried: dict[str, dict[str, Any]] = {}
         self._shown: dict[str, Any] | None = None
-        """What the controls say of the chosen body, as the server told it."""
+        """The state of the selected body that the controls show."""
         self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NONES)  # pyright: ignore
-        self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Carries", NONES)  # pyright: ignore
+        self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Object", NONES)  # pyright: ignore
         self._scale = gui.add_slider("Size", *SCALE_RANGE, 0.05, initial_value=1.0)
-        self._position = gui.add_vector3("Moved, mm", (0.0, 0.0, 0.0), step=1.0, hint="x, y, z on its body")
-        self._turn = gui.add_vector3("Turned, °", (0.0, 0.0, 0.0), step=1.0, hint="about x, y, z of its body")
-        self._drags = gui.add_checkbox("By hand", False, hint="arrows and rings in the scene: drag the mesh into place")
+        self._position = gui.add_vector3(
+            "Position, mm", (0.0, 0.0, 0.0), step=1.0, hint="x, y, z in the frame of the body"
+        )
+        self._turn = gui.add_vector3(
+            "Rotation, °", (0.0, 0.0, 0.0), step=1.0, hint="about the x, y and z axes of the body"
+        )
+        self._drags = gui.add_checkbox(
+            "Drag to move", False, hint="show arrows and rings in the scene that move the object on its body"
+        )
         self._stand = gui.add_button(
             "It stands on the sheet",
             icon=viser.Icon.ARROW_BAR_TO_DOWN,
-            hint="the prop stands upright on the calibration sheet's centre: find its place from that",
+            hint="measure the position of the object on its body while the prop stands upright on the sheet's centre",
         )
-        self._unit = gui.add_dropdown("Unit of a file", tuple(UNITS_M), initial_value="m")
+        self._unit = gui.add_dropdown("Unit of the file", tuple(UNITS_M), initial_value="m")
         self._upload = gui.add_upload_button(
-            "Bring in a mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
+            "Import mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
         )
         self._problems = gui.add_markdown("")
         self._stand.on_click(lambda _: self._perform(self._stand_on_sheet))
@@ -49,10 +55,10 @@ class ObjectsTab:
             handle.on_update(by_visitor(lambda: self._perform(self._select)))
         for handle in (self._position, self._turn):
             handle.on_update(by_visitor(lambda: self._perform(self._place)))
-        self._upload.on_upload(lambda _: self._perform(self._bring_in))
+        self._upload.on_upload(lambda _: self._perform(self._import))
 
     def refresh(self, answer: dict[str, Any]) -> None:
-        """Offer what there is now, as the server told it."""
+        """Offer the bodies and objects that exist now, as the server lists them."""
         self._carried = {
             body if len(answer["bodies"]) == 1 else f"{actor}: {body}": {"actor": actor, "body": body, **prop}
             for actor, props in answer["bodies"].items()
@@ -66,18 +72,20 @@ class ObjectsTab:
         if self._body.options != bodies:
             self._body.options = bodies
             self._show_body()
-        elif self._carried.get(self._body.value) != self._shown:  # changed by a drop, the handles or somebody else
+        elif (
+            self._carried.get(self._body.value) != self._shown
+        ):  # changed by a dropped file, the gizmo or another client
             self._show_body()
 
     def follow(self, frame: Frame | None) -> None:
-        """Let the handles be where the chosen prop is at a tick."""
+        """Move the gizmo to the selected prop of a live frame."""
         chosen = self._carried.get(self._body.value) if frame is not None and self._drags.value else None
         if frame is None or chosen is None or chosen["actor"] != frame.message.actor:
-            self._handles.follow(None, None)
+            self._gizmo.follow(None, None)
             return
         offset = next((prop.offset for prop in frame.props if prop.name == chosen["body"]), None)
         pose = next((body.pose for body in frame.message.bodies if body.name == chosen["body"]), None)
-        self._handles.follow(pose, offset)
+        self._gizmo.follow(pose, offset)
 
     def _show_body(self) -> None:
         prop = self._carried.get(self._body.value)
@@ -94,7 +102,9 @@ class ObjectsTab:
     def _chosen(self) -> dict[str, Any]:
         prop = self._carried.get(self._body.value)
         if prop is None:
-            raise ValueError("no body carries anything yet; name one in the rig file, or start with --mesh NAME=FILE")
+            raise ValueError(
+                "no body carries an object yet; name one in the rig file, or start the server with --mesh NAME=FILE"
+            )
         return {"actor": prop["actor"], "body": prop["body"]}
 
     def _select(self) -> None:
@@ -114,12 +124,12 @@ class ObjectsTab:
     def _stand_on_sheet(self) -> None:
         self._ask(op="place_object", on_sheet=True, **self._chosen())
 
-    def _bring_in(self) -> str:
+    def _import(self) -> str:
         file = self._upload.value
-        return self.bring_in(file.name, file.content)
+        return self.import_mesh(file.name, file.content)
 
-    def bring_in(self, name: str, content: bytes) -> str:
-        """Let the chosen body carry the mesh of a file from now on. Raises `RefusedError`."""
+    def import_mesh(self, name: str, content: bytes) -> str:
+        """Import a mesh file and let the selected body carry it. Raises `RefusedError`."""
         chosen = self._chosen()
         with tempfile.TemporaryDirectory(prefix="manipnet-") as folder:
             path = Path(folder) / Path(name).name

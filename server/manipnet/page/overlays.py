@@ -1,4 +1,4 @@
-"""What can be laid over a hand: its sensors, its contacts, where inverse kinematics aims, and where it is going."""
+"""What can be drawn over a hand: its sensors, its contacts, the targets of inverse kinematics, and its future path."""
 
 from typing import Final
 
@@ -10,30 +10,30 @@ from manipnet.geometry import Array
 from manipnet.page.frames import Frame, PropView, ShapeView
 from manipnet.page.hand_models import HandModel, wxyz
 from manipnet.page.prop_models import PropModels
-from manipnet.page.sensor_snapshot import CELL_CENTERS, Senser, Senses
-from manipnet.synthesis.sensing.ambient import CELL_M
-from manipnet.synthesis.sensing.proximity import SENSOR_COUNT
+from manipnet.page.sensor_snapshot import Senser, Senses
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.sensing.ambient import CELL_M, CELL_OFFSETS_M
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
 from manipnet.wire import Side
 
 OVERLAYS: Final = {
     "ambient": "Ambient sensor",
-    "proximity": "Proximity",
+    "proximity": "Proximity sensors",
     "contacts": "Contacts",
     "targets": "IK targets",
-    "ghost": "Ghost ahead",
+    "ghost": "Future pose",
 }
-"""Names of the layers, and what people call them."""
+"""The overlays by name, with their labels."""
 SENSED: Final = ("ambient", "proximity", "contacts", "targets")
 CONTACT_M: Final = 0.004
-"""A sensor nearer than this touches."""
+"""A sensor within this distance of the surface counts as a contact."""
 
 NEAR, FAR = np.array([255.0, 92.0, 60.0]), np.array([70.0, 140.0, 255.0])
 AMBIENT_COLOR: Final = (255, 190, 80)
 TOUCH_COLOR: Final = (255, 72, 40)
 TARGET_COLOR: Final = (80, 255, 160)
 OCCUPIED: Final = 0.3
-"""Share of a cell inside the object from which it is shown."""
+"""A cell is drawn if at least this share of it is inside the object."""
 RAW_COLOR: Final = (255, 255, 255)
 PATH_COLOR: Final = (140, 190, 255)
 
@@ -44,26 +44,27 @@ class HandOverlays:
     They hang on its wrist: browsers move what hangs together at once, and take in new points when they find the time.
     """
 
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+    def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
+        sensors, joints = hand.sensor_count, hand.joint_count
         self._wrist = scene.add_frame(name, show_axes=False)
-        self._ambient = _points(scene, f"{name}/ambient", len(CELL_CENTERS), 0.35 * CELL_M, AMBIENT_COLOR)
+        self._ambient = _points(scene, f"{name}/ambient", len(CELL_OFFSETS_M), 0.35 * CELL_M, AMBIENT_COLOR)
         self._rays = scene.add_line_segments(
             f"{name}/rays",
-            np.zeros((SENSOR_COUNT, 2, 3)),
-            np.zeros((SENSOR_COUNT, 2, 3), np.uint8),
+            np.zeros((sensors, 2, 3)),
+            np.zeros((sensors, 2, 3), np.uint8),
             thickness=1.5,
             thickness_units="screen",
         )
-        self._points = _points(scene, f"{name}/sensors", SENSOR_COUNT, 0.0035)
-        self._touches = _points(scene, f"{name}/contacts", SENSOR_COUNT, 0.009, TOUCH_COLOR)
-        self._raw = _points(scene, f"{name}/raw", 22, 0.004, RAW_COLOR)
-        self._targets = _points(scene, f"{name}/targets", 22, 0.007, TARGET_COLOR)
+        self._points = _points(scene, f"{name}/sensors", sensors, 0.0035)
+        self._touches = _points(scene, f"{name}/contacts", sensors, 0.009, TOUCH_COLOR)
+        self._raw = _points(scene, f"{name}/raw", joints, 0.004, RAW_COLOR)
+        self._targets = _points(scene, f"{name}/targets", joints, 0.007, TARGET_COLOR)
         self._aims = scene.add_line_segments(
-            f"{name}/aims", np.zeros((22, 2, 3)), TARGET_COLOR, thickness=2.0, thickness_units="screen"
+            f"{name}/aims", np.zeros((joints, 2, 3)), TARGET_COLOR, thickness=2.0, thickness_units="screen"
         )
 
     def show(self, senses: Senses | None, shown: set[str]) -> None:
-        """The layers in `shown`; none without senses."""
+        """Draw the overlays in `shown`; without senses, hide all of them."""
         shown = shown if senses is not None else set()
         self._ambient.visible = "ambient" in shown
         self._rays.visible = self._points.visible = "proximity" in shown
@@ -103,16 +104,16 @@ class HandOverlays:
 
 
 class Ghost:
-    """Where wrists and props of one actor will be at the end of the window, and the way there."""
+    """The poses of one actor's wrists and props at the end of the window, and the paths to them."""
 
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        self._scene, self._name = scene, name
+    def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
+        self._scene, self._name, self._hand = scene, name, hand
         self._hands: dict[Side, HandModel] = {}
         self._props = PropModels(scene, f"{name}/props", ghost=True)
         self._paths: dict[str, viser.LineSegmentsHandle] = {}
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], visible: bool) -> None:
-        """As of one tick."""
+        """Draw one tick."""
         message = frame.message
         ends = {name: window[-1] for name, window in frame.windows.items()}
         self._props.show(frame.props, shapes, ends, visible)
@@ -120,7 +121,9 @@ class Ghost:
             end = ends.get(f"{side}_wrist")
             if visible and end is not None:
                 if side not in self._hands or self._hands[side].scale != hand.scale:
-                    self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", side, hand.scale, ghost=True)
+                    self._hands[side] = HandModel(
+                        self._scene, f"{self._name}/{side}", self._hand, side, hand.scale, ghost=True
+                    )
                 self._hands[side].pose(hand, end)
         for side, model in self._hands.items():
             model.show(visible and side in message.hands and f"{side}_wrist" in ends)
@@ -140,21 +143,21 @@ class Ghost:
 
 
 class ActorOverlays:
-    """All layers of one actor, under `name`."""
+    """All overlays of one actor, under `name`."""
 
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        self._scene, self._name, self._senser = scene, name, Senser()
+    def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
+        self._scene, self._name, self._hand, self._senser = scene, name, hand, Senser(hand)
         self._hands: dict[Side, HandOverlays] = {}
-        self._ghost = Ghost(scene, f"{name}/ghost")
+        self._ghost = Ghost(scene, f"{name}/ghost", hand)
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], shown: set[str]) -> None:
-        """The layers in `shown`, of one tick."""
+        """Draw the overlays in `shown` of one tick."""
         self._ghost.show(frame, shapes, "ghost" in shown)
         props = {prop.name: prop for prop in frame.props}
         for side in ("left", "right"):
             senses = self._senses(frame, side, props, shapes) if shown & set(SENSED) else None
             if senses is not None and side not in self._hands:
-                self._hands[side] = HandOverlays(self._scene, f"{self._name}/{side}")
+                self._hands[side] = HandOverlays(self._scene, f"{self._name}/{side}", self._hand)
             if side in self._hands:
                 self._hands[side].show(senses, shown)
 

@@ -1,4 +1,4 @@
-"""The panel of one visitor: how things stand for everybody, controls for those who may."""
+"""The panel of one visitor: the state of the server for everybody, and controls for operators."""
 
 import math
 from typing import Any
@@ -20,7 +20,7 @@ NOTE_S = 6.0
 
 
 class Panel:
-    """Built when a visitor comes. An operator sits on this machine; others only look."""
+    """The panel beside the scene. A visitor on the server's own machine is an operator; the others can only watch."""
 
     def __init__(self, ask: Ask, show: Show, client: viser.ClientHandle, operator: bool) -> None:
         self._ask, self._show, self._client = ask, show, client
@@ -49,11 +49,11 @@ class Panel:
         side.dock_left()
 
     def refresh(self) -> None:
-        """Bring it up to date, twice a second."""
+        """Show the newest state of the server; called twice a second."""
         try:
             self._refresh()
         except RefusedError as error:
-            self._headline.content = f"**the server does not answer:** {error}"
+            self._headline.content = f"**The server does not answer:** {error}"
 
     def _refresh(self) -> None:
         history = next(iter(self._show.histories.values()), None) or History()
@@ -69,7 +69,7 @@ class Panel:
             self._takes.refresh()
 
     def follow(self, frame: Frame | None) -> None:
-        """Let what hangs on a prop be where it is at a tick; None for a recording."""
+        """Move the gizmo with its prop, as it is in a live frame; None hides it while a recording is shown."""
         if self.objects is not None:
             self.objects.follow(frame)
 
@@ -78,15 +78,15 @@ class Panel:
         try:
             text = action()
         except (RefusedError, ValueError, OSError) as error:
-            self._client.add_notification("That did not work", str(error), color="red", auto_close_seconds=3 * NOTE_S)
+            self._client.add_notification("Failed", str(error), color="red", auto_close_seconds=3 * NOTE_S)
         else:
             if text:
                 self._client.add_notification("Done", text, color="green", auto_close_seconds=NOTE_S)
 
     def _controls(self, gui: viser.GuiApi) -> None:
-        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="hold the hands where they are")
+        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="keep the hands as they are")
         rest = gui.add_button(
-            "Rest", icon=viser.Icon.HAND_STOP, hint="ease the hands to their rest pose, to begin anew"
+            "Rest", icon=viser.Icon.HAND_STOP, hint="ease both hands to the rest pose and start again from there"
         )
         self._on_click(self._pause, self._toggle_pause)
         self._on_click(rest, self._asking(op="rest"))
@@ -97,7 +97,7 @@ class Panel:
         for name, label in OVERLAYS.items():
             box = gui.add_checkbox(label, name in self._show.overlays)
             box.on_update(lambda event, name=name: self._show.set_overlay(name, event.target.value))
-        center = gui.add_button("Center the view", icon=viser.Icon.FOCUS_2)
+        center = gui.add_button("Center view", icon=viser.Icon.FOCUS_2)
         self._on_click(center, self._show.recenter)
 
     def _toggle_pause(self) -> None:
@@ -106,7 +106,7 @@ class Panel:
     def _show_paused(self, paused: bool) -> None:
         if paused != self._paused:
             self._paused = paused
-            self._pause.label = "Go on" if paused else "Pause"
+            self._pause.label = "Resume" if paused else "Pause"
             self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
 
     def _asking(self, **request: Any) -> Action:
@@ -122,12 +122,12 @@ class Panel:
 def _headline(show: Show, status: dict[str, Any], history: History) -> str:
     frames = show.live.values()
     if not frames:
-        return "○ **Waiting for bodies**: `manipnet doctor` says why nothing arrives"
+        return "○ **Waiting for bodies.** Run `manipnet doctor` to find out why none arrive."
     latency = next(iter(frames)).message.latency_ms
     what = "◐ **Paused**" if _paused(status) else "● **Live**"
     if show.recording is not None:
         what = f"▶ **{show.recording.name}**"
-    waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms work"
+    waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms processing"
     return f"{what} · {history.rate_hz:.0f} hands/s\n\n{waits}"
 
 
@@ -136,7 +136,7 @@ def _paused(status: dict[str, Any]) -> bool:
 
 
 def _health(status: dict[str, Any]) -> str:
-    rows = ["| | body | per s | seen |", "|---|---|--:|--:|"]
+    rows = ["| | body | Hz | last seen |", "|---|---|--:|--:|"]
     hands = []
     for name, actor in status["actors"].items():
         if len(status["actors"]) > 1:
@@ -149,8 +149,8 @@ def _health(status: dict[str, Any]) -> str:
             hands.append(f"{side} hand **{hand['state']}**" + (f" on {hand['object']}" if hand["object"] else ""))
     counters = status["counters"]
     lost = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
-    refused = f"{lost} frames and bodies refused" if lost else "nothing refused"
-    return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, f"{refused} since the start"])
+    refused = f"{lost} frames and bodies refused" if lost else "no frame or body refused"
+    return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, f"{refused} since the server started"])
 
 
 def _ago(age_s: float) -> str:

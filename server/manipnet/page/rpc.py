@@ -1,4 +1,4 @@
-"""The page's process at the other end: what the server hands over, and requests to it."""
+"""The page's end of the pipe to the server: frames and shapes arrive, requests are sent."""
 
 import contextlib
 import itertools
@@ -15,11 +15,11 @@ import msgpack
 from manipnet.page.serialization import pack, unpack
 
 ANSWER_S: Final = 60.0
-"""A shape of a large mesh takes a while to build."""
+"""The shape of a large mesh takes a while to build."""
 
 
 class RefusedError(RuntimeError):
-    """A request the server did not meet; the text says why."""
+    """The server refused a request; the text says why."""
 
 
 class RpcClient:
@@ -32,7 +32,7 @@ class RpcClient:
         self._asked: dict[int, Future] = {}
 
     def incoming(self) -> Iterator[tuple[str, Any]]:
-        """Everything but answers, as it comes; ends when the server does."""
+        """Everything but answers, as it arrives; ends when the server ends."""
         with contextlib.suppress(EOFError, OSError):
             while True:
                 what, content = unpack(self._connection.recv_bytes())
@@ -43,7 +43,7 @@ class RpcClient:
                     yield what, content
 
     def ask(self, **request: Any) -> dict[str, Any]:
-        """One control request, as in docs/protocol.md, and its answer. Raises `RefusedError`."""
+        """Send one control request of docs/protocol.md and return its answer. Raises `RefusedError`."""
         number, answer = next(self._numbers), Future()
         self._asked[number] = answer
         self._send("ask", (number, msgpack.packb(request)))
@@ -56,20 +56,20 @@ class RpcClient:
         return reply
 
     def watch(self, watched: bool) -> None:
-        """Tell whether a browser is open."""
+        """Report whether a browser is open."""
         self._send("watched", watched)
 
     def log(self, level: int, text: str) -> None:
-        """A line for the server's log."""
+        """Send a line to the server's log."""
         self._send("log", (level, text))
 
     def _send(self, what: str, content: Any) -> None:
-        with self._sending, contextlib.suppress(OSError):  # the server has ended: `incoming` notices
+        with self._sending, contextlib.suppress(OSError):  # the server has ended, which `incoming` notices
             self._connection.send_bytes(pack(what, content))
 
 
 class RpcLog(logging.Handler):
-    """Carries the log of this process to the server's."""
+    """Forwards the log of this process to the server's."""
 
     def __init__(self, link: RpcClient) -> None:
         super().__init__(logging.WARNING)

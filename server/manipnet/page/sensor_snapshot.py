@@ -1,26 +1,22 @@
-"""What a hand senses and aimed for at a tick, computed for the eye: in the page's process, by the network's kernels.
+"""What a hand senses and aims for at a tick, computed for display in the page's process with the network's kernels.
 
 The sensors are those of the hand as it is shown. The network's own were on the pose it went on from, a tick before and
 without its grip: they would be up to a centimetre beside the fingers.
 """
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
-from manipnet.geometry import Array, mirror_points, mirror_poses
+from manipnet.geometry import Array, mirror_points, mirror_poses, scale_positions
 from manipnet.page.frames import Frame, ShapeView
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.ik.snapshot import take_snapshot
 from manipnet.synthesis.objects.mesh import ClosedMesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
-from manipnet.synthesis.sensing.ambient import CELL_M, CELLS, CENTER_M
+from manipnet.synthesis.sensing.ambient import CELL_OFFSETS_M
 from manipnet.wire import Side
-
-_STEPS: Final = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
-CELL_CENTERS: Final = CENTER_M + np.stack(np.meshgrid(_STEPS, _STEPS, _STEPS, indexing="ij"), axis=-1).reshape(-1, 3)
-"""`(1000, 3)` in the wrist frame of a right hand, in the order of the sensor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,20 +36,25 @@ class Senses:
 
 
 class Senser:
-    """Senses with shapes, each of which is built, or read from the cache, once."""
+    """Computes snapshots; each shape is built, or read from the cache, once."""
 
-    def __init__(self) -> None:
+    def __init__(self, hand: Hand) -> None:
+        self._hand = hand
         self._shapes: dict[str, Shape] = {}
 
     def sense(self, frame: Frame, side: Side, view: ShapeView, prop_scale: float) -> Senses:
-        """What the hand of one side senses of the shape it is about."""
+        """The snapshot of one hand and the shape of its prop."""
         hand, shown = frame.hands[side], frame.message.hands[side]
-        size, positions, rotations = shown.scale, *forward_kinematics(np.asarray(shown.angles, np.float64))
-        wrist, obj = (_shrunk(pose, size) for pose in (shown.wrist, _present(frame, hand.prop)))
+        size, positions, rotations = shown.scale, *forward_kinematics(self._hand, np.asarray(shown.angles, np.float64))
+        wrist, obj = (
+            scale_positions(np.asarray(pose, np.float64), 1.0 / size)
+            for pose in (shown.wrist, _present(frame, hand.prop))
+        )
         mirrored = side == "left"
         if mirrored:
             wrist, obj = mirror_poses(wrist), mirror_poses(obj)
         local = take_snapshot(
+            self._hand,
             self._shape(view),
             wrist,
             obj,
@@ -69,8 +70,8 @@ class Senser:
             return size * (mirror_points(points) if mirrored else points)
 
         return Senses(
-            _shrunk(shown.wrist, 1.0),
-            real(CELL_CENTERS),
+            np.asarray(shown.wrist, np.float64),
+            real(self._hand.sensors.grid_center + CELL_OFFSETS_M),
             local.ambient,
             real(local.points),
             real(local.normals) / size,
@@ -87,10 +88,5 @@ class Senser:
 
 
 def _present(frame: Frame, name: str) -> Array:
-    """Where a body is at the tick."""
+    """The pose of a body at the tick."""
     return frame.windows[name][len(frame.windows[name]) // 2]
-
-
-def _shrunk(pose: Array, size: float) -> Array:
-    """A pose as a hand of the model's size would see it."""
-    return np.concatenate([np.asarray(pose[:3], np.float64) / size, pose[3:]])

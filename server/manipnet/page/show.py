@@ -16,6 +16,7 @@ from manipnet.page.overlays import ActorOverlays
 from manipnet.page.playback import Recording
 from manipnet.page.prop_models import PropModels, lowest_m
 from manipnet.page.scenery import Scenery
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.wire import Side
 
 FLOOR_EVERY: Final = 15
@@ -25,8 +26,11 @@ FLOOR_EVERY: Final = 15
 class Show:
     """Draws frames of the live session, or of a recording while one is open."""
 
-    def __init__(self, server: viser.ViserServer, drawn: Callable[[Frame | None], None]) -> None:
-        """`drawn` is called with every live frame that was drawn, and with None for a frame of a recording."""
+    def __init__(self, server: viser.ViserServer, hand: Hand, drawn: Callable[[Frame | None], None]) -> None:
+        """`hand` is the one that is drawn.
+
+        `drawn` is called with every live frame that was drawn, and with None for a frame of a recording.
+        """
         self.overlays: set[str] = set()
         """Keys of `overlays.OVERLAYS` that are visible."""
         self.live: dict[str, Frame] = {}
@@ -35,7 +39,7 @@ class Show:
         """Rates and latencies of each actor."""
         self.recording: Recording | None = None
         """The recording that is shown instead of the live session."""
-        self._server, self._drawn = server, drawn
+        self._server, self._hand, self._drawn = server, hand, drawn
         self._scenery = Scenery(server.scene)
         self._shapes: dict[str, ShapeView] = {}
         self._views: dict[str, ActorView] = {}
@@ -97,7 +101,7 @@ class Show:
         with self._drawing, self._server.atomic():
             self._settle(frame, shapes)
             if name not in self._views:
-                self._views[name] = ActorView(self._server.scene, name)
+                self._views[name] = ActorView(self._server.scene, name, self._hand)
             self._views[name].show(frame, shapes, self.overlays)
             self._drawn(None if self.recording is not None else frame)
 
@@ -125,18 +129,18 @@ class Show:
 class ActorView:
     """The hands, props and overlays of one actor in the scene."""
 
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        self._scene, self._name = scene, f"/{name}"
+    def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
+        self._scene, self._name, self._hand = scene, f"/{name}", hand
         self._hands: dict[Side, HandModel] = {}
         self._props = PropModels(scene, f"/{name}/props")
-        self._overlays = ActorOverlays(scene, f"/{name}/layers")
+        self._overlays = ActorOverlays(scene, f"/{name}/layers", hand)
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], overlays: set[str]) -> None:
         """Draw one frame with the given overlays."""
         hands = frame.message.hands
         for side, hand in hands.items():
             if side not in self._hands or self._hands[side].scale != hand.scale:
-                self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", side, hand.scale)
+                self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", self._hand, side, hand.scale)
             self._hands[side].pose(hand)
         for side, model in self._hands.items():
             model.show(side in hands)

@@ -1,8 +1,8 @@
-"""The live page as its server sees it: an address, and a process of its own from the first visit on.
+"""The live page as the server sees it: an address, and a child process from the first visit on.
 
-Nothing of the page runs in the server: it costs a socket until a browser comes, and then what one thread needs to hand
-over the newest tick. The process ends with the server, however that ends; when the process ends, the next visit or the
-browser's own reconnecting starts another.
+Nothing of the page runs in the server: until a browser connects it costs a socket, and then one thread that sends the
+newest tick. The process ends with the server, however the server ends. If the process ends, the next visit or a
+browser that reconnects starts another one.
 """
 
 import contextlib
@@ -13,29 +13,30 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, Final
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.plan import Plan
 from manipnet.actors.props import Prop
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
 from manipnet.net.errors import ListenError
 from manipnet.page.frames import Frame, HandView, PropView, ShapeView
 from manipnet.page.serialization import pack, unpack
 from manipnet.runtime.child_process import ChildProcess
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.synthesizer import HandStep, Side
+from manipnet.synthesis.synthesizer import HandStep
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
 
 FRAMES_HZ: Final = 30.0
-"""As many ticks a second go to the page; the newest ones."""
+"""The page receives at most this many ticks per second, always the newest."""
 POLL_S: Final = 0.2
 """A stop is noticed within this."""
 STOP_S: Final = 3.0
 RESTART_S: Final = (0.5, 30.0)
-"""Before a page that ended is started again; longer each time it does not last."""
+"""The pause before the page is started again; it grows each time the page ends early."""
 LASTED_S: Final = 60.0
 
 _log = logging.getLogger(__name__)
@@ -44,16 +45,17 @@ Submit = Callable[[list[bytes], Callable[[bytes], object]], None]
 
 
 class LivePage:
-    """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
+    """Listens from its creation until `stop`, and serves from `start` on. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, submit: Submit, telemetry: Telemetry) -> None:
-        """Raises `ListenError`. `submit` meets the page's requests, as it does any client's."""
+    def __init__(self, host: str, port: int, submit: Submit, telemetry: Telemetry, hand_file: Path) -> None:
+        """Raises `ListenError`. `submit` receives the requests of the page, as it does for any client; `hand_file`
+        describes the hand that is shown."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._submit, self._telemetry = submit, telemetry
+        self._submit, self._telemetry, self._hand_file = submit, telemetry, hand_file
         self.watched = False
-        """Whether a browser is open: only then is there anything to `see`."""
-        self._news, self._telling = threading.Condition(), threading.Lock()
+        """Whether a browser is open; only then `see` is worth calling."""
+        self._arrived, self._sending = threading.Condition(), threading.Lock()
         self._newest: dict[str, tuple[Frame, Sequence[Shape]]] = {}
         self._stopping = threading.Event()
         self._wake, self._woken = socket.socketpair()
@@ -64,13 +66,13 @@ class LivePage:
         self._thread.start()
 
     def see(self, actor: Actor, plan: Plan, message: HandsMessage) -> None:
-        """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
+        """Offer a tick, without computing or copying anything. A tick that was not sent yet is replaced by the next."""
         frame = frame_of(actor, plan.tick, plan.steps, message)
-        with self._news:
+        with self._arrived:
             if message.actor in self._newest:
                 self._telemetry.count("page_frames", fate="skipped")
             self._newest[message.actor] = frame, [prop.shape for prop in actor.props]
-            self._news.notify()
+            self._arrived.notify()
 
     def stop(self) -> None:
         """End the page and free the port."""
@@ -87,12 +89,14 @@ class LivePage:
             begin_s = time.monotonic()
             try:
                 self._serve()
-            except Exception as error:  # whatever it is, the session goes on without a page
-                _log.error("the page: %s: %s", type(error).__name__, error)
+            except Exception as error:  # the session must continue without a page
+                _log.error("the page failed: %s: %s", type(error).__name__, error)
             if self._stopping.is_set():
                 return
             self._telemetry.count("page_ended", reason="crash")
-            _log.error("the page's process has ended; the session goes on, and a visit starts the page again")
+            _log.error(
+                "the process of the page has ended; the session continues, and the next visit starts the page again"
+            )
             pause_s = RESTART_S[0] if time.monotonic() - begin_s > LASTED_S else min(2.0 * pause_s, RESTART_S[1])
             self._stopping.wait(pause_s)
 
@@ -105,8 +109,8 @@ class LivePage:
         return not self._stopping.is_set()
 
     def _serve(self) -> None:
-        """One life of the page's process."""
-        child = ChildProcess("page", _page, self._listener)
+        """Run the page's process until it or the server ends."""
+        child = ChildProcess("page", _page, self._listener, self._hand_file)
         ours = child.connection
         sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
         try:
@@ -116,13 +120,13 @@ class LivePage:
             self.watched = False
             child.close(STOP_S)
             child.kill()
-            with self._news:
+            with self._arrived:
                 self._newest.clear()
-                self._news.notify()
+                self._arrived.notify()
             sender.join()
 
     def _listen_to(self, ours: Connection) -> None:
-        """Until the process or the server ends: who watches, what is asked, what is worth a line in the log."""
+        """Receive from the page until it or the server ends: whether it is watched, its requests, and its log."""
         while not self._stopping.is_set():
             try:
                 if not ours.poll(POLL_S):
@@ -134,17 +138,21 @@ class LivePage:
                 self.watched = content
             elif what == "ask":
                 number, request = content
-                self._submit([request], lambda answer, number=number: self._tell(ours, "answer", (number, answer)))
+
+                def reply(answer: bytes, number: int = number) -> None:
+                    self._send_message(ours, "answer", (number, answer))
+
+                self._submit([request], reply)
             elif what == "log":
                 _log.log(content[0], "%s", content[1])
 
     def _send(self, ours: Connection) -> None:
-        """Hand over the newest ticks, and each shape before the first tick it is in."""
+        """Send the newest ticks, and each shape before the first tick that refers to it."""
         sent: set[str] = set()
         while not ours.closed:
-            with self._news:
+            with self._arrived:
                 if not self._newest:
-                    self._news.wait(1.0)
+                    self._arrived.wait(1.0)
                 newest, self._newest = list(self._newest.values()), {}
             begin_s = time.monotonic()
             for frame, shapes in newest:
@@ -153,19 +161,19 @@ class LivePage:
                         sent.add(shape.content_hash)
                         mesh = shape.mesh
                         view = ShapeView(shape.name, shape.content_hash, mesh.vertices, mesh.faces)
-                        self._tell(ours, "shape", view)
-                self._tell(ours, "frame", frame)
+                        self._send_message(ours, "shape", view)
+                self._send_message(ours, "frame", frame)
                 self._telemetry.count("page_frames", fate="shown")
             time.sleep(max(begin_s + 1.0 / FRAMES_HZ - time.monotonic(), 0.0))
 
-    def _tell(self, ours: Connection, what: str, content: Any) -> None:
-        parcel = pack(what, content)
-        with self._telling, contextlib.suppress(OSError, ValueError):  # it has ended; who listens to it notices
-            ours.send_bytes(parcel)
+    def _send_message(self, ours: Connection, what: str, content: Any) -> None:
+        message = pack(what, content)
+        with self._sending, contextlib.suppress(OSError, ValueError):  # the page has ended, which `_listen_to` notices
+            ours.send_bytes(message)
 
 
 def frame_of(actor: Actor, tick: Tick, steps: Mapping[Side, HandStep], message: HandsMessage) -> Frame:
-    """All there is to see of one tick of an actor."""
+    """Everything that the page can show of one tick of an actor."""
     props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
     windows = {name: body.window for name, body in tick.bodies.items()}
     hands: dict[Side, HandView] = {}
@@ -179,10 +187,10 @@ def _prop(prop: Prop, offset: Array) -> PropView:
     return PropView(prop.name, prop.object, prop.shape.content_hash, prop.scale, offset)
 
 
-def _page(connection: Connection, listener: socket.socket) -> None:
-    from manipnet.page.app import serve  # what it needs is of no use to the server itself
+def _page(connection: Connection, listener: socket.socket, hand_file: Path) -> None:
+    from manipnet.page.app import serve  # the server itself does not need the libraries of the page
 
-    serve(listener, connection)
+    serve(listener, connection, hand_file)
 
 
 def _listen(host: str, port: int) -> socket.socket:

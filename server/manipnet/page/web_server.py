@@ -1,4 +1,4 @@
-"""A viser server that only answers whom it should: on a socket that is given, to pages of its own, without a tunnel."""
+"""A viser server on a given socket that answers only its own pages and opens no public tunnel."""
 
 import asyncio
 import contextlib
@@ -21,9 +21,9 @@ from manipnet.net.half_open import BACKLOG, HalfOpen
 from manipnet.page import policy
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
-"""Whether the connection being served may change anything: a page of this machine, looked at on this machine."""
+"""Whether the visitor may change anything: a browser on this machine that shows a page of this machine."""
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
-"""What the page adds to viser's own: a title, and files that are dropped on it."""
+"""What the page adds to viser's client: a title, and the import of files that are dropped on it."""
 DROP_PATH: Final = "/drop"
 OPEN_S: Final = 10.0
 """A visitor that has not sent a whole request after this time is cut off."""
@@ -44,9 +44,9 @@ class Server(viser.ViserServer):
 
 
 def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server:
-    """Serve on a socket that already listens; on loopback only pages of this machine come in.
+    """Serve on a socket that already listens; on loopback, only pages of this machine may connect.
 
-    `dropped` is given the name and content of a file an operator dropped on the page, and says what became of it.
+    `dropped` receives the name and content of a file that an operator dropped on the page, and returns a message.
     """
     with _served_on(listener, dropped):
         return Server(host="127.0.0.1", port=0, label=label, verbose=False)
@@ -54,7 +54,7 @@ def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server
 
 @contextlib.contextmanager
 def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
-    """Viser has neither an option for a socket nor one for origins, so what it calls is stood in for."""
+    """Viser has no option for a socket or for origins, so the function that it calls is replaced meanwhile."""
     original = websockets.asyncio.server.serve
     taking: set[object] = set()
     exposed = not is_loopback(listener.getsockname()[0])
@@ -74,7 +74,7 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
                 return connection.respond(HTTPStatus.FORBIDDEN, "This page is not for other web sites.\n")
             if (reason := policy.refusal(request)) is not None:
                 return connection.respond(HTTPStatus.BAD_REQUEST, reason)
-            with contextlib.suppress(KeyError):  # the script is put into what has not been compressed
+            with contextlib.suppress(KeyError):  # the script is inserted into the uncompressed page
                 del request.headers["Accept-Encoding"]
             response = process_request(connection, request)
             if response is not None and policy.is_page(response, request):
@@ -112,9 +112,11 @@ def may_act(address: str, headers: Any) -> bool:
 
 
 async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped, taking: set[object]) -> None:
-    """One file: its name in the query, its content the only message. `taking` holds the connections that bring files."""
+    """Receive one file: its name is in the query, its content is the only message. `taking` has the connections that
+    are sending files.
+    """
     if not OPERATOR.get():
-        await connection.close(_POLICY_VIOLATION, "only the server's own machine may bring in files")
+        await connection.close(_POLICY_VIOLATION, "only a browser on the server's own machine may import files")
         return
     if len(taking) >= MAX_DROPS:
         await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_DROPS} files at a time")

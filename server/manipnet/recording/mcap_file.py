@@ -6,10 +6,10 @@
 | `/hands` | the hands message of `docs/protocol.md`, msgpack |
 | `/tf` | Foxglove's FrameTransforms, JSON: bodies and OpenXR joints in the frame `world` |
 
-Log times are this machine's clock at the arrival, nanoseconds; the sender's clock is inside the messages. The meshes
-are attachments, the rig and the model's hash metadata, all before the first message. Chunks are small and handed to
-the system at once, so a process that is killed loses a fraction of a second; no reader here needs the end of a file.
-Sources: mcap.dev/spec; docs.foxglove.dev, "Message schemas", FrameTransforms.
+Log times are this machine's clock at the arrival, in nanoseconds; the messages hold the sender's clock. The meshes are
+attachments, and the rig and the hash of the model are metadata; both come before the first message. Chunks are small
+and are handed to the operating system at once, so a process that is killed loses a fraction of a second. No reader here
+needs the end of a file. Sources: mcap.dev/spec; docs.foxglove.dev, "Message schemas", FrameTransforms.
 """
 
 import json
@@ -27,22 +27,22 @@ from mcap.writer import Writer
 from numpy.typing import NDArray
 
 from manipnet.geometry import Array
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES
 from manipnet.wire import HandsMessage, decode_msgpack, encode_msgpack
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, bodies_map, parse_bodies
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES
 
 BODIES: Final = "/bodies"
 HANDS: Final = "/hands"
 TF: Final = "/tf"
 ABOUT: Final = "manipnet"
-"""Name of the metadata record: model, model_hash, rig and whatever else the writer knew."""
+"""Name of the metadata record, which holds model, model_hash, rig and whatever else the writer knew."""
 FLUSH_NS: Final = 250_000_000
-"""What a killed process loses at most, of the clock of the log times."""
+"""A killed process loses at most this much, by the clock of the log times."""
 MAX_RECORD_BYTES: Final = 1 << 28
 
 
 def _record(title: str | None, **properties: dict[str, Any]) -> dict[str, Any]:
-    """JSON schema of an object that has all of `properties`."""
+    """JSON schema of an object with all of these properties."""
     named = {"title": title} if title else {}
     return named | {"type": "object", "properties": properties, "required": list(properties)}
 
@@ -74,22 +74,23 @@ _SCHEMAS: Final[dict[str, dict[str, Any]]] = {
     ),
     TF: _record("foxglove.FrameTransforms", transforms={"type": "array", "items": _TRANSFORM}),
 }
-"""JSON schemas of the topics in JSON; the title is the schema's name, by which Foxglove knows its own."""
+"""JSON schemas of the topics in JSON. Foxglove recognises its own schemas by their titles."""
 
 _log = logging.getLogger(__name__)
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be used; the text names the file, what is wrong with it, and what to do."""
+    """A recording that cannot be used; the text names the file, what is wrong, and what to do."""
 
 
 class RecordingWriter:
-    """Writes one recording. Not for several threads at once."""
+    """Writes one recording. Not thread-safe."""
 
     def __init__(self, path: Path, about: Mapping[str, str], meshes: Mapping[str, bytes] | None = None) -> None:
-        """Start the file `path`, which must not exist (`FileExistsError`); other troubles raise `OSError`.
+        """Create the file `path`. Raises `FileExistsError` if it exists, and other kinds of `OSError`.
 
-        `about` becomes the metadata; `meshes` are mesh files (`mesh_file`) by file name, whose stem is the object's.
+        `about` becomes the metadata. `meshes` are mesh files, as `mesh_file` makes them, by their file names, whose
+        stems are the names of the props.
         """
         self._file = path.open("xb")
         self._writer = Writer(self._file)
@@ -103,13 +104,13 @@ class RecordingWriter:
         self._flushed_ns = 0
 
     def write_bodies(self, frame: BodyFrame, now_ns: int) -> None:
-        """One frame as it came in, at `now_ns` (`time.time_ns()`; a generated recording counts from any origin)."""
+        """Write a frame that arrived at `now_ns`, by `time.time_ns()`; a generated recording may use any clock."""
         self._add(BODIES, json.dumps(bodies_map(frame), separators=(",", ":")).encode(), now_ns)
         poses = [(body.name or str(body.id), (*body.p, *body.q)) for body in frame.bodies if body.tracked]
         self._add(TF, _transforms(poses, now_ns), now_ns)
 
     def write_hands(self, message: HandsMessage, now_ns: int) -> None:
-        """One message as it was published. Raises `MessageError` for numbers that are not finite."""
+        """Write a message that was published at `now_ns`. Raises `MessageError` for numbers that are not finite."""
         self._add(HANDS, encode_msgpack(message), now_ns)
         actor = message.actor
         poses = [
@@ -122,11 +123,11 @@ class RecordingWriter:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Messages written so far, by topic."""
+        """The number of messages so far, by topic."""
         return self._counts
 
     def close(self) -> None:
-        """Finish the file; harmless when called twice."""
+        """Finish the file; a second call does nothing."""
         if not self._file.closed:
             self._writer.finish()
             self._file.close()
@@ -157,19 +158,19 @@ class About:
     metadata: Mapping[str, str]
     meshes: Mapping[str, bytes]
     counts: Mapping[str, int]
-    """Messages by topic."""
+    """The number of messages by topic."""
     whole: bool
 
 
 def mesh_file(vertices: Array, faces: NDArray[np.integer[Any]], scale: float = 1.0) -> bytes:
-    """A mesh as the file a recording keeps: PLY in metres, as large as it was on the stage."""
+    """A mesh as a recording keeps it: a PLY file in metres, at the size it had on the stage."""
     content = trimesh.Trimesh(scale * vertices, faces, process=False).export(file_type="ply")
     assert isinstance(content, bytes)
     return content
 
 
 def bodies_of(message: HandsMessage) -> BodyFrame:
-    """The bodies of a hands message as the frame a tracker would have sent at that instant."""
+    """The bodies of a hands message as the frame that a tracker would have sent at that instant."""
     bodies = [
         BodySample(None, body.name, tuple(body.pose[:3].tolist()), tuple(body.pose[3:].tolist()), body.tracked)
         for body in message.bodies
@@ -178,7 +179,7 @@ def bodies_of(message: HandsMessage) -> BodyFrame:
 
 
 def read_about(path: Path | str) -> About:
-    """Everything but the messages. Raises `RecordingError` for a file that is no recording at all."""
+    """Read everything except the messages. Raises `RecordingError` for a file that is not a recording."""
     scan = _Scan(Path(path))
     metadata: dict[str, str] = {}
     meshes, counts = {}, {}
@@ -196,14 +197,14 @@ def read_about(path: Path | str) -> About:
 def read_messages(path: Path | str, *topics: str) -> Iterator[tuple[str, int, bytes]]:
     """Topic, log time in nanoseconds and payload of the messages of `topics`, in the order of writing.
 
-    What is damaged or cut off is left out, with a warning. Raises `RecordingError` for a file that is no recording.
+    Damaged parts are left out, with a warning. Raises `RecordingError` for a file that is not a recording.
     """
     scan = _Scan(Path(path))
     for record in scan.records():
         if isinstance(record, Message) and (topic := scan.topics[record.channel_id]) in topics:
             yield topic, record.log_time, record.data
     if not scan.whole:
-        _log.warning("%s: its end is cut off or parts are damaged; all that can be read was", path)
+        _log.warning("%s is cut off or damaged; the undamaged parts were read", path)
 
 
 def read_bodies(path: Path | str) -> Iterator[BodyFrame]:
@@ -213,7 +214,7 @@ def read_bodies(path: Path | str) -> Iterator[BodyFrame]:
         try:
             yield parse_bodies(payload, time_ns * 1e-9, source)
         except MessageError as error:
-            raise RecordingError(f"{path}: a message of {BODIES} is no body message: {error}") from None
+            raise RecordingError(f"{path}: a message of {BODIES} is not a valid body message: {error}") from None
 
 
 def read_hands(path: Path | str) -> Iterator[HandsMessage]:
@@ -222,17 +223,17 @@ def read_hands(path: Path | str) -> Iterator[HandsMessage]:
         try:
             yield decode_msgpack(payload)
         except MessageError as error:
-            raise RecordingError(f"{path}: a message of {HANDS} is no hands message: {error}") from None
+            raise RecordingError(f"{path}: a message of {HANDS} is not a valid hands message: {error}") from None
 
 
 def recover(path: Path | str, out: Path) -> About:
-    """Write all that can be read of `path` to the new file `out`; returns what that is.
+    """Write everything that can be read of `path` to the new file `out`; returns what was read.
 
-    Raises `RecordingError` where nothing can be read and `FileExistsError` where `out` exists.
+    Raises `RecordingError` if no message can be read and `FileExistsError` if `out` exists.
     """
     about = read_about(path)
     if not about.counts:
-        raise RecordingError(f"{path}: holds no message that can be read; nothing can be recovered")
+        raise RecordingError(f"{path}: no message can be read, so nothing can be recovered")
     with RecordingWriter(out, about.metadata, about.meshes) as writer:
         for topic, time_ns, payload in read_messages(path, BODIES, HANDS, TF):
             writer._add(topic, payload, time_ns)
@@ -248,7 +249,7 @@ class _Scan:
         self.whole = False
 
     def records(self) -> Iterator[McapRecord]:
-        """Records in order, those inside of chunks too; `whole` is set after the last one."""
+        """Records in order, including those in chunks; `whole` is set after the last one."""
         damaged = False
         try:
             with self._path.open("rb") as file:
@@ -263,16 +264,16 @@ class _Scan:
             self.whole = not damaged
         except OSError as error:
             raise RecordingError(f"{self._path}: cannot be read ({error.strerror})") from None
-        except Exception as error:  # a cut-off file: the reader raises whatever it stumbles over
+        except Exception as error:  # the reader raises errors of any type for a file that is cut off
             if not self.topics:
-                raise RecordingError(f"{self._path}: is no recording, or ends before its first message") from error
+                raise RecordingError(f"{self._path}: not a recording, or cut off before its first message") from error
 
 
 def _unpack(chunk: Chunk) -> Sequence[McapRecord] | None:
-    """The records of a chunk; None for a damaged one."""
+    """The records of a chunk; None if it is damaged."""
     try:
         return breakup_chunk(chunk, validate_crc=True)
-    except Exception:  # decompression and parsing raise whatever they stumble over
+    except Exception:  # decompression and parsing raise errors of any type
         return None
 
 

@@ -19,9 +19,11 @@ def compile_aside() -> None:
     """Compile all kernels of a start and of a tick except the solver's, by a use of each."""
     import numpy as np
 
+    from manipnet.synthesis.hand.kinematics import forward_kinematics
     from manipnet.synthesis.hand.limits import keep_angles
     from manipnet.synthesis.hand.openxr import pose_in_world
     from manipnet.synthesis.model.features import features
+    from manipnet.synthesis.model.shipped import shipped_hand
     from manipnet.synthesis.objects.distance_field import build_field
     from manipnet.synthesis.objects.library import load_library_mesh
     from manipnet.synthesis.objects.shape import build_shape
@@ -32,13 +34,14 @@ def compile_aside() -> None:
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     scene = HandScene("right", still, still, still, build_shape(load_library_mesh("cube")))
     build_field(scene.shape.bvh)
-    features(scene.shape, windows_of([scene]), np.zeros((1, 22, 3)), np.tile(np.eye(3), (1, 17, 1, 1)))
-    track, angles = PoseBuffer(), np.zeros(20)
+    hand = shipped_hand()
+    features(hand, scene.shape, windows_of([scene]), *forward_kinematics(hand, np.zeros((1, hand.angle_count))))
+    track, angles = PoseBuffer(), np.zeros(hand.angle_count)
     for t_s in (0.0, 0.1):
         track.add(t_s, still[0])
     sample([track], np.linspace(-0.5, 0.5, 21), 0.0, 0.1, damped_velocity)
-    keep_angles(angles, np.zeros((20, 2)), angles, 1.0, np.empty(20))
-    pose_in_world(["right"], angles[None], still[:1], 1.0)
+    keep_angles(angles, hand.limits.copy(), angles, 1.0, np.empty_like(angles))
+    pose_in_world(hand, ["right"], angles[None], still[:1], 1.0)
 
 
 class Precompiler:

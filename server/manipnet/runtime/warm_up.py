@@ -14,9 +14,9 @@ from manipnet.config.settings import default_actor
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
-from manipnet.synthesis.ik.pose import POSERS, SolverName, allocate_poses
+from manipnet.synthesis.ik.pose import allocate_poses, pose_kernel
+from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.model.layout import INPUT_SIZE
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import HandScene, Synthesizer, windows_of
@@ -30,7 +30,7 @@ LOOK_AHEAD_S: Final = 0.4
 """Less than the window needs, so that something has to be forecast."""
 
 
-def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: SolverName = "least_squares") -> None:
+def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: str = DEFAULT_SOLVER) -> None:
     """Synthesise two hands at each shape for half a second, in a loop like the real one whose messages go nowhere."""
     for shape in shapes:
         telemetry = Telemetry()
@@ -55,14 +55,16 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: SolverName = "least
                 pass
 
 
-def pose_a_hand(bundle: Bundle, solver: SolverName = "least_squares") -> None:
+def pose_a_hand(bundle: Bundle, solver: str = DEFAULT_SOLVER) -> None:
     """Decode and solve one pose: at a first start this process compiles the solver, while another compiles the rest."""
     shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
-    outputs, before = bundle.infer(np.zeros((1, INPUT_SIZE), np.float32)), bundle.rest_angles[None]
-    poses = allocate_poses(1)
+    hand, layout, before = bundle.hand, bundle.layout, bundle.rest_angles[None]
+    outputs = bundle.infer(np.zeros((1, layout.input_size), np.float32))
+    poses = allocate_poses(hand, 1)
     poses.correction[:] = 0.0
-    POSERS[solver](shape.solid, windows, outputs, before, bundle.response, bundle.limits, 0, 1, poses)
+    network = outputs, before, bundle.response, bundle.limits
+    pose_kernel(solver)(hand.packed, layout.output_starts, shape.solid, windows, *network, 0, 1, poses)
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

@@ -30,8 +30,8 @@ class Server:
     From Python, in a module whose main part is guarded by `if __name__ == "__main__":`, because large meshes and the
     live page run in processes of their own:
 
-        config = ServerConfig((default_actor(),), port=0)
-        Server(config, say=print).run()
+        actor = default_actor((parse_object("Box=mug"),))
+        Server(ServerConfig((actor,)), say=print).run()
     """
 
     def __init__(

@@ -17,6 +17,7 @@ from manipnet.runtime.mesh_watch import MeshWatch
 from manipnet.runtime.prometheus import MetricsPage
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.server.session import Session
+from manipnet.synthesis.hand.hand_file import HAND_FILE
 
 LOOPBACK: Final = "127.0.0.1"
 
@@ -37,7 +38,7 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     config, telemetry = session.config, session.telemetry
     recorder = Recorder(config.takes, session.recording_context, telemetry)
     opened.callback(recorder.stop)
-    outputs = open_outputs(config.of, Emission(telemetry, config.host, keys))
+    outputs = open_outputs(config.of, Emission(telemetry, session.bundle.hand, config.host, keys))
     publisher = Publisher(outputs, telemetry, recorder.note)
     opened.callback(publisher.close)
     meshes = MeshWatch(session.catalog, session.replace_shape)
@@ -49,7 +50,7 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     opened.callback(control.stop)
     control.start()
     page_host = LOOPBACK if keys is not None else config.host  # browsers have no keys
-    page = LivePage(page_host, config.page_port, dispatcher.submit, telemetry)
+    page = LivePage(page_host, config.page_port, dispatcher.submit, telemetry, session.bundle.folder / HAND_FILE)
     opened.callback(page.stop)
     page.start()
     receivers = make_receivers(config.of, session.senders, telemetry, config.host, keys, config.allow)

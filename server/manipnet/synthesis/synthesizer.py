@@ -1,16 +1,16 @@
-"""One tick: from where wrists and objects are to the pose of every hand. No clock, no sockets, no files.
+"""One tick: from the poses of wrists and objects to the pose of every hand. It knows no clock, socket or file.
 
 The same code runs live, in replay, offline, in training and in evaluation.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from manipnet.geometry import (
     Array,
+    Side,
     compose,
     matrix_to_quat,
     mirror_points,
@@ -19,24 +19,24 @@ from manipnet.geometry import (
     quat_multiply,
     transform,
 )
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.ik.pose import POSERS, SOLVERS, Poses, SolverName, allocate_poses
+from manipnet.synthesis.ik.pose import Poses, allocate_poses, pose_kernel
+from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.model.features import RAYS_PER_HAND, Windows, sense
-from manipnet.synthesis.model.layout import INPUT_SIZE, PRESENT, WINDOW_OFFSETS_S
+from manipnet.synthesis.model.features import Windows, rays_of, sense
+from manipnet.synthesis.model.layout import PRESENT, WINDOW
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.sensing.proximity import allocate_rays
 
-Side = Literal["left", "right"]
 ABSENT_HAND_M = 0.45
 """Distance at which a hand that is not tracked is assumed to be."""
 _SIGNS: dict[Side, Array] = {"left": mirror_poses(np.ones(7)), "right": np.ones(7)}
-"""What makes a pose the one of a right hand."""
+"""The signs that turn a pose into the one of a right hand."""
 
 
 @dataclass(frozen=True, eq=False)
 class HandScene:
-    """What one hand can know at one tick: world trajectories sampled at `WINDOW_OFFSETS_S` about it."""
+    """What one hand can know at one tick: trajectories in the world, sampled at `layout.WINDOW_OFFSETS_S` about it."""
 
     side: Side
     wrist: Array
@@ -51,17 +51,17 @@ class HandScene:
 
 @dataclass(frozen=True, eq=False)
 class HandState:
-    """What a hand carries from tick to tick: the pose it feels itself in, which is what it shows but for part of the
-    last correction; in its own wrist frame, as a right hand."""
+    """What a hand carries from tick to tick: the feedback pose, which is the shown pose minus part of the last
+    correction, in the hand's own wrist frame, as a right hand."""
 
     angles: Array
-    """`(20,)` radians."""
+    """`(A,)` radians."""
     positions: Array
-    """`(22, 3)` metres."""
+    """`(J, 3)` metres."""
     rotations: Array
-    """`(17, 3, 3)`."""
+    """`(B, 3, 3)`."""
     correction: Array
-    """`(20,)` what inverse kinematics added to the network's angles, radians."""
+    """`(A,)` what inverse kinematics added to the network's angles, radians."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,27 +70,27 @@ class HandStep:
 
     state: HandState
     angles: Array
-    """`(20,)` radians."""
+    """`(A,)` radians."""
     positions: Array
-    """`(22, 3)` metres."""
+    """`(J, 3)` metres."""
     rotations: Array
-    """`(17, 3, 3)`."""
+    """`(B, 3, 3)`."""
     distances: Array
-    """`(22,)` joint to surface as predicted, metres, in [0, 0.035]."""
+    """`(J,)` joint to surface as predicted, metres, in [0, 0.035]."""
     raw_positions: Array
-    """`(22, 3)` before inverse kinematics."""
+    """`(J, 3)` before inverse kinematics."""
 
 
-def state_of(angles: Array) -> HandState:
-    """The state of a hand posed by `angles (20,)`."""
-    return HandState(angles, *forward_kinematics(angles), np.zeros(len(angles)))
+def state_of(hand: Hand, angles: Array) -> HandState:
+    """The state of a hand posed by `angles (A,)`."""
+    return HandState(angles, *forward_kinematics(hand, angles), np.zeros(len(angles)))
 
 
 def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations: Array) -> tuple[Array, Array]:
     """Carry poses from the canonical wrist frame to the world, mirroring a left hand back.
 
-    `T_world_wrist (..., 7)` is the real wrist, `positions (..., 22, 3)`, `rotations (..., 17, 3, 3)`. Returns
-    positions `(..., 22, 3)` and quaternions `(..., 17, 4)`.
+    `T_world_wrist (..., 7)` is the real wrist, `positions (..., J, 3)`, `rotations (..., B, 3, 3)`. Returns
+    positions `(..., J, 3)` and quaternions `(..., B, 4)`.
     """
     quats = matrix_to_quat(rotations)
     if side == "left":
@@ -100,7 +100,7 @@ def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations:
 
 
 def windows_of(scenes: Sequence[HandScene]) -> Windows:
-    """Scenes as the network sees them: left hands mirrored into right ones."""
+    """Scenes as the network sees them, left hands mirrored into right ones."""
     windows = _allocate_windows(len(scenes))
     for n, scene in enumerate(scenes):
         _put_scene(windows, n, scene)
@@ -108,7 +108,7 @@ def windows_of(scenes: Sequence[HandScene]) -> Windows:
 
 
 def _allocate_windows(count: int) -> Windows:
-    shape = (count, len(WINDOW_OFFSETS_S))
+    shape = (count, WINDOW)
     return Windows(
         np.empty((*shape, 7)), np.empty((*shape, 3)), np.empty((*shape, 7)), np.empty(count, np.bool_), np.empty(count)
     )
@@ -135,39 +135,59 @@ class Synthesizer:
     def __init__(
         self,
         bundle: Bundle,
-        solver: SolverName = "least_squares",
+        solver: str = DEFAULT_SOLVER,
         on_stage: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """`on_stage` hears the name of each stage as it ends: `sense`, `infer`, `ik`."""
-        if solver not in SOLVERS:
-            raise ValueError(f"solver {solver!r} is unknown; allowed are {', '.join(SOLVERS)}")
-        self._bundle, self._pose, self._on_stage = bundle, POSERS[solver], on_stage
+        """`solver` is a name in `ik.solvers.SOLVERS`; raises `ValueError` for any other.
+
+        `on_stage` is called with the name of each stage when it ends: `sense`, `infer`, `ik`.
+        """
+        self._bundle, self._pose, self._on_stage = bundle, pose_kernel(solver), on_stage
         self._batches: dict[int, _Batch] = {}
+
+    @property
+    def hand(self) -> Hand:
+        """The hand that is posed."""
+        return self._bundle.hand
 
     def rest_state(self) -> HandState:
         """The neutral pose every hand starts from."""
-        return state_of(self._bundle.rest_angles)
+        return state_of(self._bundle.hand, self._bundle.rest_angles)
 
     def step(self, scenes: Sequence[HandScene], states: Sequence[HandState]) -> list[HandStep]:
         """The next pose of each hand, from its scene at this tick and its state after the last one."""
         if not scenes:
             return []
         count, bundle = len(scenes), self._bundle
+        hand, layout = bundle.hand, bundle.layout
         if count not in self._batches:
-            self._batches[count] = _Batch(count)
-        batch, poses = self._batches[count], allocate_poses(count)
+            self._batches[count] = _Batch(bundle, count)
+        batch, poses = self._batches[count], allocate_poses(hand, count)
         order = sorted(range(count), key=lambda index: id(scenes[index].shape))
         for n, index in enumerate(order):
             batch.put(n, scenes[index], states[index])
             poses.correction[n] = states[index].correction
         groups = _groups([scenes[index].shape for index in order])
         for shape, first, last in groups:
-            sense(shape, batch.windows, batch.positions, batch.rotations, first, last, batch.rays, batch.rows)
+            sense(
+                hand,
+                layout,
+                shape,
+                batch.windows,
+                batch.positions,
+                batch.rotations,
+                first,
+                last,
+                batch.rays,
+                batch.rows,
+            )
         self._on_stage("sense")
         outputs = bundle.infer(batch.rows)
         self._on_stage("infer")
         for shape, first, last in groups:
             self._pose(
+                hand.packed,
+                layout.output_starts,
                 shape.solid,
                 batch.windows,
                 outputs,
@@ -184,22 +204,22 @@ class Synthesizer:
 
 
 class _Batch:
-    """What the kernels take of so many hands: made once, filled at every tick."""
+    """The kernels' inputs for a number of hands: allocated once, filled at every tick."""
 
-    def __init__(self, count: int) -> None:
+    def __init__(self, bundle: Bundle, count: int) -> None:
         self.windows = _allocate_windows(count)
-        self.angles, self.positions, self.rotations = allocate_poses(count)[:3]
-        self.rays = allocate_rays(count * RAYS_PER_HAND + 1)
-        self.rows = np.empty((count, INPUT_SIZE), np.float32)
+        self.angles, self.positions, self.rotations = allocate_poses(bundle.hand, count)[:3]
+        self.rays = rays_of(bundle.hand, count)
+        self.rows = np.empty((count, bundle.layout.input_size), np.float32)
 
     def put(self, n: int, scene: HandScene, state: HandState) -> None:
-        """Let a hand be number `n`."""
+        """Make a hand number `n`."""
         _put_scene(self.windows, n, scene)
         self.angles[n], self.positions[n], self.rotations[n] = state.angles, state.positions, state.rotations
 
 
 def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
-    """Stretches of one shape: the shape, the first hand, one past the last."""
+    """Stretches of hands about the same shape: the shape, the first hand, one past the last."""
     starts = [n for n, shape in enumerate(shapes) if n == 0 or shape is not shapes[n - 1]]
     return [(shapes[first], first, last) for first, last in zip(starts, [*starts[1:], len(shapes)], strict=True)]
 

@@ -1,8 +1,8 @@
-"""Where a body will be: the future that a shorter look-ahead does not wait for.
+"""Forecasts where a body will be, for the future that a shorter look-ahead does not wait for.
 
-A forecast is any function of the shape `body_track.Forecast`. The one here needs no training: the velocity of the last
-moments, dying away, because hands and what they hold soon stop or turn. A linear predictor fitted to captured takes is
-no better (`benchmarks/forecasts.py`, `docs/results.md`).
+Any function of the type `pose_buffer.Forecast` can take the place of the one here, which needs no training: it
+continues with the velocity of the last moments, which fades, because hands and what they hold soon stop or turn. A
+linear predictor that was fitted to captured takes is no better (`benchmarks/forecasts.py`, `docs/results.md`).
 """
 
 from typing import Final
@@ -13,17 +13,17 @@ from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, vector
 
 FIT_S: Final = 0.035
-"""The velocity is fitted to this much history: enough to average tracking noise, little enough to be present."""
+"""The velocity is fitted to this much history: long enough to average tracking noise, short enough to be current."""
 FADE_S: Final = 0.2
 FADE_SPIN_S: Final = 0.12
-"""Time constants with which velocity and spin die away; a motion ends at that times its present velocity."""
+"""Time constants of the fading velocity and spin; in all, a motion goes on by this time multiplied by its velocity."""
 
 
 def damped_velocity(times_s: Array, poses: Array, future_s: Array) -> Array:
-    """Continue a motion from its last pose with its fading velocity.
+    """Continue a motion, in position and rotation, from its last pose with a fading velocity.
 
-    `times_s (m,)` rising, `poses (m, 7)`, `future_s (n,)` at or after `times_s[-1]`; returns `(n, 7)`.
-    Position and rotation alike; a history of one sample stands still.
+    `times_s (m,)` rise, `poses (m, 7)` are in the world, and `future_s (n,)` are at or after `times_s[-1]`. Returns
+    world poses `(n, 7)`. A history of one sample stands still.
     """
     out = np.empty((len(future_s), 7))
     _damped_velocity(times_s, poses, future_s, out)
@@ -32,7 +32,7 @@ def damped_velocity(times_s: Array, poses: Array, future_s: Array) -> Array:
 
 @inner
 def _turn_since(q, last, out):
-    """Shortest rotation vector from the unit quaternion `last` to `q`, into `out (3,)`."""
+    """Write the shortest rotation vector from the unit quaternion `last` to `q` into `out (3,)`."""
     w = q[0] * last[0] + q[1] * last[1] + q[2] * last[2] + q[3] * last[3]
     x = q[0] * last[3] - q[3] * last[0] - q[1] * last[2] + q[2] * last[1]
     y = q[1] * last[3] - q[3] * last[1] - q[2] * last[0] + q[0] * last[2]
@@ -45,7 +45,7 @@ def _turn_since(q, last, out):
 
 @inner
 def _turned_into(turn, q, out):
-    """The unit quaternion `q` turned on by a rotation vector, into `out (4,)`."""
+    """Write the unit quaternion `q`, turned by a rotation vector, into `out (4,)`."""
     angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
     gain = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
     x, y, z, w = gain * turn[0], gain * turn[1], gain * turn[2], np.cos(0.5 * angle)

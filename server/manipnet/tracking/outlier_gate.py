@@ -1,43 +1,47 @@
-"""Body by body, what a tracker claims and cannot be: jumps, swapped identities, frozen poses, zeros.
+"""Takes samples out of a frame that cannot be real: jumps, swapped identities, frozen poses, zeros.
 
-A rejected body is handed on as not tracked, with the reason as its `fault`; what to show for a lost body is not
-decided here. Time that goes backwards, doubled and late frames are the timeline's. No clock, no I/O.
+A rejected body is passed on as not tracked, with the reason as its `fault`; the hands decide what to show for a lost
+body. The timeline deals with time that goes backwards and with duplicate and late frames. No clock, no I/O.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 from manipnet.wire.bodies import BodyFrame, BodySample
 
-MAX_SPEED_M_S = 20.0
-MAX_SPIN_RAD_S = 40.0
-MARGIN_M = 0.1
-MARGIN_RAD = 0.5
-"""Faster than this, beyond a margin for noise, is no hand and nothing in one."""
-CONFIRM_S = 0.2
-"""A body that stays where it jumped to this long is believed to be there."""
-FORGET_S = 1.0
-"""After so long without an accepted sample, or so far back in time, a body is taken where it appears."""
-SWAP_SPEED_M_S = 4.0
-SWAP_RATIO = 0.25
-"""Two bodies faster than this, each this near to where the other was (of the way they made), have swapped."""
-NOISE_M = 1e-3
-NOISE_TURNS = 20
-"""Noise turns back at most of its small steps, which motion never does: a tracker whose body has shown so many more
-small steps back than on has noise, and then it never stands still."""
-FROZEN_S = 0.5
-MOVING_S = 0.1
-"""A body is frozen that has not changed for `FROZEN_S` while others of its sender did within `MOVING_S`."""
-MAX_BODIES_KNOWN = 1_024
+MAX_SPEED_M_S: Final = 20.0
+MAX_SPIN_RAD_S: Final = 40.0
+MARGIN_M: Final = 0.1
+MARGIN_RAD: Final = 0.5
+"""No hand, and nothing in a hand, moves faster than this by more than a margin for noise."""
+CONFIRM_S: Final = 0.2
+"""A jump is believed when the body has stayed where it jumped to for this long."""
+FORGET_S: Final = 1.0
+"""After this long without an accepted sample, or this far back in time, a body is accepted wherever it appears."""
+SWAP_SPEED_M_S: Final = 4.0
+SWAP_RATIO: Final = 0.25
+"""Two bodies were swapped if both moved faster than this and each is now near the other's old place: nearer than this
+share of the distance between the two places.
+"""
+NOISE_M: Final = 1e-3
+NOISE_TURNS: Final = 20
+"""Noise reverses direction at most small steps; real motion does not. A body that has shown this many more small steps
+back than forth has noise, so it can never be perfectly still.
+"""
+FROZEN_S: Final = 0.5
+MOVING_S: Final = 0.1
+"""A body is frozen if it has not changed for `FROZEN_S` while others of its sender did within `MOVING_S`."""
+MAX_BODIES: Final = 1_024
 
 Key = tuple[str, int | None, str | None]
 Vector = tuple[float, float, float]
 
 
 @dataclass(slots=True)
-class _Memory:
-    """The newest accepted sample of one body, where it may have jumped to, and what is known of its noise."""
+class _History:
+    """The newest accepted sample of one body, the place it may have jumped to, and what is known of its noise."""
 
     t_s: float
     sample: BodySample
@@ -49,14 +53,19 @@ class _Memory:
 
 
 class OutlierGate:
-    """Judges the bodies of any number of senders, each in the light of its own past. Not thread-safe."""
+    """Judges the bodies of any number of senders, each by its own past. Not thread-safe."""
 
     def __init__(self) -> None:
-        self._memories: dict[Key, _Memory] = {}
+        self._histories: dict[Key, _History] = {}
         self._moved_s: dict[str, float] = {}
 
+    @property
+    def known_bodies(self) -> int:
+        """The number of bodies whose past is known, at most `MAX_BODIES`."""
+        return len(self._histories)
+
     def check(self, frame: BodyFrame) -> tuple[BodyFrame, list[str]]:
-        """The frame with impossible bodies made untracked, and why (of `telemetry.BODY_REASONS`)."""
+        """The frame with impossible bodies made untracked, and the reasons, of `telemetry.BODY_REASONS`."""
         swapped = self._swapped(frame)
         bodies = [self._judge(frame, body, body in swapped) for body in frame.bodies]
         reasons = [body.fault for body in bodies if body.fault is not None]
@@ -66,29 +75,29 @@ class OutlierGate:
         if not body.tracked:
             return body
         key = _key(frame, body)
-        memory = self._memories.get(key)
-        if memory is None:
-            if len(self._memories) >= MAX_BODIES_KNOWN:
-                self._memories.clear()
+        history = self._histories.get(key)
+        if history is None:
+            if len(self._histories) >= MAX_BODIES:
+                self._histories.clear()
                 self._moved_s.clear()
-            self._memories[key] = _Memory(frame.t_s, body, changed_s=frame.t_s)
+            self._histories[key] = _History(frame.t_s, body, changed_s=frame.t_s)
             return body
-        # Where nothing moves, a recording has ended or is paused: no single body was lost.
+        # If nothing moves, a recording has ended or is paused, and no single body is frozen.
         others_move = frame.t_s - self._moved_s.get(frame.source, frame.t_s) < MOVING_S
-        fault = _fault(memory, frame.t_s, body, swapped, others_move)
-        if memory.changed_s == frame.t_s:
+        fault = _fault(history, frame.t_s, body, swapped, others_move)
+        if history.changed_s == frame.t_s:
             self._moved_s[frame.source] = frame.t_s
         return body if fault is None else replace(body, tracked=False, fault=fault)
 
     def _swapped(self, frame: BodyFrame) -> Sequence[BodySample]:
-        """Bodies that exchanged their places in one step, as trackers do when they confuse two."""
+        """Bodies that exchanged their places in one step, as they do when a tracker confuses two of them."""
         fast: list[tuple[BodySample, Vector]] = []
         for body in frame.bodies:
-            memory = self._memories.get(_key(frame, body)) if body.tracked else None
-            if memory is None or not 0.0 < frame.t_s - memory.t_s < CONFIRM_S:
+            history = self._histories.get(_key(frame, body)) if body.tracked else None
+            if history is None or not 0.0 < frame.t_s - history.t_s < CONFIRM_S:
                 continue
-            if math.dist(body.p, memory.sample.p) > SWAP_SPEED_M_S * (frame.t_s - memory.t_s):
-                fast.append((body, memory.sample.p))
+            if math.dist(body.p, history.sample.p) > SWAP_SPEED_M_S * (frame.t_s - history.t_s):
+                fast.append((body, history.sample.p))
         return [
             one
             for one, p_one in fast
@@ -98,64 +107,65 @@ class OutlierGate:
         ]
 
 
-def _fault(memory: _Memory, t_s: float, body: BodySample, swapped: bool, others_move: bool) -> str | None:
-    """Why a tracked sample cannot be, or None; updates the memory."""
-    elapsed_s = t_s - memory.t_s
+def _fault(history: _History, t_s: float, body: BodySample, swapped: bool, others_move: bool) -> str | None:
+    """Why a tracked sample cannot be real, or None; updates the history."""
+    elapsed_s = t_s - history.t_s
     if elapsed_s < -FORGET_S:
-        _accept(memory, t_s, body)
+        _accept(history, t_s, body)
         return None
-    if body.p == (0.0, 0.0, 0.0) and math.dist(body.p, memory.sample.p) > MARGIN_M:
+    if body.p == (0.0, 0.0, 0.0) and math.dist(body.p, history.sample.p) > MARGIN_M:
         return "zeros"
-    if _stands_still(memory, t_s, body) and others_move:
+    if _is_still(history, t_s, body) and others_move:
         return "frozen"
     if elapsed_s > FORGET_S:
-        _accept(memory, t_s, body)
+        _accept(history, t_s, body)
         return None
-    if not swapped and _is_near(memory.sample, body, abs(elapsed_s)) and _is_back(memory, body):
-        _accept(memory, t_s, body)
+    if not swapped and _is_near(history.sample, body, abs(elapsed_s)) and _is_back(history, body):
+        _accept(history, t_s, body)
         return None
-    if memory.candidate is None or not _is_near(memory.candidate[1], body, abs(t_s - memory.candidate[0])):
-        memory.jumped_s = t_s
-    memory.candidate = (t_s, body)
-    if t_s - memory.jumped_s < CONFIRM_S:
+    if history.candidate is None or not _is_near(history.candidate[1], body, abs(t_s - history.candidate[0])):
+        history.jumped_s = t_s
+    history.candidate = (t_s, body)
+    if t_s - history.jumped_s < CONFIRM_S:
         return "swap" if swapped else "jump"
-    _accept(memory, t_s, body)
+    _accept(history, t_s, body)
     return None
 
 
-def _accept(memory: _Memory, t_s: float, body: BodySample) -> None:
-    if abs(t_s - memory.t_s) > FORGET_S or t_s >= memory.t_s:  # a late sample is good but not the newest
-        memory.t_s, memory.sample = t_s, body
-    memory.candidate = None
+def _accept(history: _History, t_s: float, body: BodySample) -> None:
+    if abs(t_s - history.t_s) > FORGET_S or t_s >= history.t_s:  # a late sample is accepted but is not the newest
+        history.t_s, history.sample = t_s, body
+    history.candidate = None
 
 
 def _is_near(known: BodySample, body: BodySample, elapsed_s: float) -> bool:
+    """Whether a body can have moved from a known sample to a new one within `elapsed_s`."""
     if math.dist(known.p, body.p) > MARGIN_M + MAX_SPEED_M_S * elapsed_s:
         return False
     return _angle(known, body) <= MARGIN_RAD + MAX_SPIN_RAD_S * elapsed_s
 
 
-def _is_back(memory: _Memory, body: BodySample) -> bool:
+def _is_back(history: _History, body: BodySample) -> bool:
     """Whether a body that jumped is nearer to where it came from than to where it went."""
-    return memory.candidate is None or _way(memory.sample, body) < _way(memory.candidate[1], body)
+    return history.candidate is None or _distance_m(history.sample, body) < _distance_m(history.candidate[1], body)
 
 
-def _stands_still(memory: _Memory, t_s: float, body: BodySample) -> bool:
-    """Whether a body whose tracker has noise has not changed by a bit for long; learns the noise.
+def _is_still(history: _History, t_s: float, body: BodySample) -> bool:
+    """Whether a body with noise has been bit-identical for long; learns the noise.
 
-    A body without noise is computed, not tracked (a recording's prop that lies on a table): it may stand still.
+    A body without noise is computed, not tracked, such as a recorded prop on a table; it may be still.
     """
-    if body.p == memory.sample.p and body.q == memory.sample.q:
-        return memory.noise_turns >= NOISE_TURNS and t_s - memory.changed_s > FROZEN_S
+    if body.p == history.sample.p and body.q == history.sample.q:
+        return history.noise_turns >= NOISE_TURNS and t_s - history.changed_s > FROZEN_S
     step = (
-        body.p[0] - memory.sample.p[0],
-        body.p[1] - memory.sample.p[1],
-        body.p[2] - memory.sample.p[2],
+        body.p[0] - history.sample.p[0],
+        body.p[1] - history.sample.p[1],
+        body.p[2] - history.sample.p[2],
     )
-    turned = sum(a * b for a, b in zip(step, memory.step, strict=True)) < 0.0
-    if memory.noise_turns < NOISE_TURNS and math.hypot(*step) < NOISE_M:
-        memory.noise_turns = memory.noise_turns + 1 if turned else max(memory.noise_turns - 1, 0)
-    memory.step, memory.changed_s = step, t_s
+    turned = sum(a * b for a, b in zip(step, history.step, strict=True)) < 0.0
+    if history.noise_turns < NOISE_TURNS and math.hypot(*step) < NOISE_M:
+        history.noise_turns = history.noise_turns + 1 if turned else max(history.noise_turns - 1, 0)
+    history.step, history.changed_s = step, t_s
     return False
 
 
@@ -164,8 +174,8 @@ def _angle(one: BodySample, other: BodySample) -> float:
     return 2.0 * math.acos(min(cosine, 1.0))
 
 
-def _way(one: BodySample, other: BodySample) -> float:
-    """Position and rotation in one measure, metres: a body is about a decimetre from its centre to its rim."""
+def _distance_m(one: BodySample, other: BodySample) -> float:
+    """Position and rotation in one measure: the rim of a body is about a decimetre from its centre."""
     return math.dist(one.p, other.p) + 0.1 * _angle(one, other)
 
 

@@ -9,40 +9,38 @@ from manipnet.geometry import Array
 from manipnet.jit import inner, kernel
 
 KEEP: Final = 1024
-"""Newest samples kept: more than 2 s at the highest rate accepted."""
+"""Number of newest samples that are kept: more than 2 s at the highest accepted rate."""
 MIN_SPACING_S: Final = 0.0015
-"""Samples closer than this to their neighbour are not taken: no tracker is that fast."""
+"""A sample closer than this to another one is a duplicate, because no tracker is that fast."""
 TIME_TOLERANCE_S: Final = 1e-6
-"""Two clocks readings this near are the same instant: times are sums of rounded fractions."""
+"""Two times this close are the same instant, because times are sums of rounded fractions."""
 
 Forecast = Callable[[Array, Array, Array], Array]
-"""`(history times (m,), history poses (m, 7), times (n,)) -> poses (n, 7)`; the history ends before the
-times.
-"""
+"""`(history times (m,), history poses (m, 7), times (n,)) -> poses (n, 7)`; the history ends before the times."""
 
 
 class PoseBuffer:
-    """Time-ordered poses of one body on its sender's clock; samples may arrive late or in the wrong order."""
+    """Poses of one body in the order of its sender's clock; samples may arrive late or in the wrong order."""
 
     def __init__(self) -> None:
         self._times = np.empty(2 * KEEP)
         self._poses = np.empty((2 * KEEP, 7))
         self._count = 0
         self.seen_s = -np.inf
-        """Newest instant this body was heard of, tracked or not."""
+        """Newest instant at which the body was in a frame, tracked or not."""
 
     @property
     def times(self) -> Array:
-        """Sample times, rising, `(n,)` seconds."""
+        """Sample times `(n,)` in seconds, rising."""
         return self._times[: self._count]
 
     @property
     def poses(self) -> Array:
-        """World poses at `times`, `(n, 7)`, neighbouring quaternions in the same hemisphere."""
+        """World poses `(n, 7)` at `times`; neighbouring quaternions are in the same hemisphere."""
         return self._poses[: self._count]
 
     def add(self, t_s: float, pose: Array | Sequence[float]) -> bool:
-        """Put one tracked pose in its place; False when there is one at (nearly) that instant already."""
+        """Insert a tracked pose; returns False, and changes nothing, if there is one at nearly the same instant."""
         at = (
             int(np.searchsorted(self.times, t_s))
             if self._count and t_s <= self._times[self._count - 1]
@@ -64,17 +62,17 @@ class PoseBuffer:
         return True
 
     def interval_s(self) -> float:
-        """Median spacing of the newest samples; infinite before the second one."""
+        """Median spacing of the newest samples; infinite before the second sample."""
         newest = self.times[-16:]
         return float(np.median(np.diff(newest))) if len(newest) > 1 else np.inf
 
     def age_s(self, t_s: float) -> float:
-        """Time since the newest tracked sample at or before `t_s`; infinite when there is none."""
+        """Time since the newest tracked sample at or before `t_s`; infinite if there is none."""
         before = int(np.searchsorted(self.times, t_s + TIME_TOLERANCE_S))
         return max(t_s - float(self._times[before - 1]), 0.0) if before else np.inf
 
     def _align(self, at: int) -> None:
-        """Keep every neighbouring pair of quaternions in one hemisphere (trackers flip signs freely)."""
+        """Keep neighbouring quaternions in one hemisphere, because trackers may flip their signs."""
         if at and self._poses[at, 3:] @ self._poses[at - 1, 3:] < 0.0:
             self._poses[at, 3:] *= -1.0
         for i in range(at + 1, self._count):
@@ -91,11 +89,11 @@ class PoseBuffer:
 def sample(
     tracks: Sequence[PoseBuffer], times_s: Array, present_s: float, until_s: float, forecast: Forecast | None
 ) -> tuple[Array, list[float]]:
-    """Poses of several non-empty tracks at rising `times_s (n,)`: `(len(tracks), n, 7)`, and their ages at `present_s`.
+    """World poses `(len(tracks), n, 7)` of non-empty tracks at rising `times_s (n,)`, and their ages at `present_s`.
 
-    Positions are interpolated linearly, rotations on the shortest arc, both by time. Only samples up to `until_s`
-    and the one that brackets it are used. Before the first sample its pose stands; after the last one `forecast`
-    continues the motion, or the last pose stands when there is none.
+    Positions are interpolated linearly and rotations on the shortest arc. Only samples up to `until_s` are used, and
+    the one that brackets it. Before the first sample, its pose stands; after the last one, `forecast` continues the
+    motion, or the last pose stands if there is no `forecast`.
     """
     poses, ages = np.empty((len(tracks), len(times_s), 7)), []
     for row, track in zip(poses, tracks, strict=True):
@@ -109,7 +107,7 @@ def sample(
 
 @inner
 def _count_before(times, t_s):
-    """How many of the rising `times` are before an instant."""
+    """Number of the rising `times` that are before an instant."""
     low, high = 0, len(times)
     while low < high:
         middle = (low + high) >> 1
@@ -122,10 +120,10 @@ def _count_before(times, t_s):
 
 @kernel
 def _resample(times, poses, at, present_s, until_s, out):
-    """Poses at the rising instants `at` between rising `times`, clamped at both ends, into `out`.
+    """Write the poses at the rising instants `at`, interpolated between the rising `times`, into `out`.
 
-    Returns how many samples serve instants up to `until_s` (up to the first at or after it, which brackets it), and
-    the age at `present_s` of the newest sample then; infinite when there is none.
+    The poses stand at both ends. Returns the number of samples up to the first one at or after `until_s`, which are
+    those that may be used, and the age of the newest sample at `present_s`, which is infinite if there is none.
     """
     known = min(_count_before(times, until_s - TIME_TOLERANCE_S) + 1, len(times))
     before = _count_before(times, present_s + TIME_TOLERANCE_S)
@@ -148,7 +146,7 @@ def _resample(times, poses, at, present_s, until_s, out):
 
 @inner
 def _slerp_into(a, b, fraction, out):
-    """Between unit quaternions of one hemisphere, on the arc between them."""
+    """Interpolate between unit quaternions of one hemisphere on the arc between them."""
     cosine = min(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3], 1.0)
     angle = np.arccos(cosine)
     sine = np.sin(angle)

@@ -3,9 +3,9 @@
 A ZeroMQ frame of hands is a topic, with a space at its end, and a payload.
 """
 
+from manipnet.geometry import SIDES, Side
 from manipnet.wire.binary_codec import decode_binary, encode_binary
 from manipnet.wire.hands import (
-    SIDES,
     STATES,
     TOPIC_BIN,
     TOPIC_MSGPACK,
@@ -14,7 +14,6 @@ from manipnet.wire.hands import (
     HandPose,
     HandsMessage,
     Latency,
-    Side,
     State,
 )
 from manipnet.wire.msgpack_codec import decode_msgpack, encode_msgpack

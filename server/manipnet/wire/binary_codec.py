@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from manipnet.geometry import SIDES
 from manipnet.wire.bodies import MAX_BODIES, MessageError
 from manipnet.wire.hands import (
     BODY,
@@ -19,7 +20,6 @@ from manipnet.wire.hands import (
     NAME_BYTES,
     PREAMBLE,
     RECORDS,
-    SIDES,
     STATES,
     VERSION,
     BodyPose,

@@ -10,7 +10,9 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Final, Literal, get_args, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
+
+from manipnet.geometry import Array, Side
+from manipnet.wire.hand_names import ANGLE_NAMES, BONE_NAMES, OPENXR_JOINT_NAMES
 
 VERSION: Final = 1
 MAGIC: Final = b"MNPL"
@@ -20,13 +22,10 @@ MAX_PAYLOAD_BYTES: Final = 131_072
 NAME_BYTES: Final = 63
 """The longest name in the binary encoding, in bytes of UTF-8. Names in msgpack may have any length."""
 
-Side = Literal["left", "right"]
 State = Literal["live", "hold", "rest"]
-SIDES: Final[tuple[Side, ...]] = get_args(Side)
 STATES: Final[tuple[State, ...]] = get_args(State)
 
 NAME: Final = np.dtype([("length", "u1"), ("text", "u1", (NAME_BYTES,))])
-Array = NDArray[np.float64]
 Name = Annotated[str, NAME]
 Float = Annotated[float, np.dtype("<f4")]
 Double = Annotated[float, np.dtype("<f8")]
@@ -37,18 +36,18 @@ Pose = Annotated[Array, np.dtype(("<f4", (7,)))]
 class HandPose:
     """One hand at one instant.
 
-    `angles (20,)` are in the order of `skeleton.DOF_NAMES`. `rotations (17, 4)` are local to the parent bone, with the
-    identity for the wrist, and mirrored (S R S) for a left hand. `wrist (7,)` and `joints (26, 7)`, in OpenXR order,
-    are world poses.
+    `angles (20,)` are in the order of `hand_names.ANGLE_NAMES`. `rotations (17, 4)` are local to the parent bone, with
+    the identity for the wrist, and mirrored (S R S) for a left hand. `wrist (7,)` and `joints (26, 7)`, in OpenXR
+    order, are world poses.
     """
 
     state: Annotated[State, np.dtype("u1")]
     object: Annotated[str | None, NAME]
     scale: Float
-    angles: Annotated[Array, np.dtype(("<f4", (20,)))]
-    rotations: Annotated[Array, np.dtype(("<f4", (17, 4)))]
+    angles: Annotated[Array, np.dtype(("<f4", (len(ANGLE_NAMES),)))]
+    rotations: Annotated[Array, np.dtype(("<f4", (len(BONE_NAMES), 4)))]
     wrist: Pose
-    joints: Annotated[Array, np.dtype(("<f4", (26, 7)))]
+    joints: Annotated[Array, np.dtype(("<f4", (len(OPENXR_JOINT_NAMES), 7)))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,8 +6,9 @@ from typing import Any
 import msgpack
 import numpy as np
 
+from manipnet.geometry import Array
 from manipnet.wire.bodies import MessageError
-from manipnet.wire.hands import MAX_PAYLOAD_BYTES, Array, BodyPose, HandPose, HandsMessage, Latency
+from manipnet.wire.hands import MAX_PAYLOAD_BYTES, BodyPose, HandPose, HandsMessage, Latency
 from manipnet.wire.validation import check, known_side, require_version
 
 

@@ -5,17 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from manipnet.geometry import SIDES, Array, Side
 from manipnet.wire.bodies import MAX_BODIES, MessageError
 from manipnet.wire.hands import (
     RECORDS,
-    SIDES,
     STATES,
     VERSION,
-    Array,
     HandPose,
     HandsMessage,
     Latency,
-    Side,
 )
 
 

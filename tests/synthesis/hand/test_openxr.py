@@ -11,8 +11,12 @@ from manipnet.geometry import (
     quat_normalize,
     quat_rotate,
 )
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS, WEBXR_JOINT_NAMES, pose_in_world
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES
+from manipnet.synthesis.hand.openxr import pose_in_world
+from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet.wire import Side
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS, WEBXR_JOINT_NAMES
+
+HAND = shipped_hand()
 
 INDEX = {name: i for i, name in enumerate(OPENXR_JOINT_NAMES)}
 IDENTITY = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
@@ -25,7 +29,7 @@ BONES += [(f, "distal", "tip") for f in FINGERS]
 
 
 def random_angles(seed: int) -> Array:
-    low, high = DOF_LIMITS_RAD.T
+    low, high = HAND.limits.T
     return np.random.default_rng(seed).uniform(low, high)
 
 
@@ -34,8 +38,8 @@ def random_wrist(seed: int) -> Array:
     return np.concatenate([rng.normal(size=3), quat_normalize(rng.normal(size=4))])
 
 
-def joints_of(side: str, wrist: Array, angles: Array, scale: float = 1.0) -> Array:
-    return pose_in_world([side], angles[None], wrist[None], scale)[1][0]
+def joints_of(side: Side, wrist: Array, angles: Array, scale: float = 1.0) -> Array:
+    return pose_in_world(HAND, [side], angles[None], wrist[None], scale)[1][0]
 
 
 def axes(joints: Array, *names: str) -> tuple[Array, Array]:
@@ -73,7 +77,7 @@ def test_parents_lead_to_the_wrist_by_name():
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("seed", range(5))
-def test_minus_z_runs_along_every_bone(side: str, seed: int):
+def test_minus_z_runs_along_every_bone(side: Side, seed: int):
     joints = joints_of(side, random_wrist(seed), random_angles(seed))
     for finger, start, end in BONES:
         along = joints[INDEX[f"{finger}_{end}"], :3] - joints[INDEX[f"{finger}_{start}"], :3]
@@ -82,7 +86,7 @@ def test_minus_z_runs_along_every_bone(side: str, seed: int):
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_plus_y_leaves_the_back_of_the_flat_hand(side: str):
+def test_plus_y_leaves_the_back_of_the_flat_hand(side: Side):
     joints = joints_of(side, IDENTITY, np.zeros(20))
     fingers = [f"{f}_{part}" for f in FINGERS for part in ("metacarpal", "proximal", "intermediate", "distal", "tip")]
     _, up = axes(joints, "palm", "wrist", *fingers)
@@ -90,18 +94,18 @@ def test_plus_y_leaves_the_back_of_the_flat_hand(side: str):
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_flexion_turns_every_bone_away_from_its_plus_y(side: str):
+def test_flexion_turns_every_bone_away_from_its_plus_y(side: Side):
     for name in ("INDEX", "MIDDLE", "RING", "PINKY", "THUMB"):
         finger = name.lower().replace("pinky", "little")
-        for dof in (i for i, d in enumerate(DOF_NAMES) if d.startswith(name) and d.endswith("_FE")):
-            if DOF_NAMES[dof] == "THUMB_CMC_FE":
+        for dof in (i for i, d in enumerate(HAND.angle_names) if d.startswith(name) and d.endswith("_FE")):
+            if HAND.angle_names[dof] == "THUMB_CMC_FE":
                 continue  # rolls the thumb across the palm
             bent = np.zeros(20)
             bent[dof] = 0.1
             before, after = joints_of(side, IDENTITY, np.zeros(20)), joints_of(side, IDENTITY, bent)
             _, back = axes(before, f"{finger}_distal")
             moved = after[INDEX[f"{finger}_tip"], :3] - before[INDEX[f"{finger}_tip"], :3]
-            assert moved @ back[0] < -0.9 * np.linalg.norm(moved), DOF_NAMES[dof]
+            assert moved @ back[0] < -0.9 * np.linalg.norm(moved), HAND.angle_names[dof]
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -115,13 +119,13 @@ def test_the_left_hand_is_the_mirror_image(seed: int):
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_quaternions_are_unit(side: str):
+def test_quaternions_are_unit(side: Side):
     joints = joints_of(side, random_wrist(1), random_angles(1))
     np.testing.assert_allclose(np.linalg.norm(joints[:, 3:], axis=1), 1.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_a_moved_wrist_carries_everything(side: str):
+def test_a_moved_wrist_carries_everything(side: Side):
     wrist, angles = random_wrist(2), random_angles(2)
     np.testing.assert_allclose(
         joints_of(side, wrist, angles), compose(wrist, joints_of(side, IDENTITY, angles)), atol=1e-12
@@ -129,7 +133,7 @@ def test_a_moved_wrist_carries_everything(side: str):
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_tips_are_turned_like_their_distal_bones(side: str):
+def test_tips_are_turned_like_their_distal_bones(side: Side):
     joints = joints_of(side, random_wrist(3), random_angles(3))
     for finger in ("thumb", *FINGERS):
         np.testing.assert_array_equal(joints[INDEX[f"{finger}_tip"], 3:], joints[INDEX[f"{finger}_distal"], 3:])
@@ -138,7 +142,7 @@ def test_tips_are_turned_like_their_distal_bones(side: str):
 @pytest.mark.parametrize("dof", ["THUMB_CMC_FE", "THUMB_CMC_AA"])
 def test_both_carpal_angles_turn_the_thumb_metacarpal(dof: str):
     bent = np.zeros(20)
-    bent[DOF_NAMES.index(dof)] = 0.3
+    bent[HAND.angle_names.index(dof)] = 0.3
     flat, turned = joints_of("right", IDENTITY, np.zeros(20)), joints_of("right", IDENTITY, bent)
     assert abs(flat[INDEX["thumb_metacarpal"], 3:] @ turned[INDEX["thumb_metacarpal"], 3:]) == pytest.approx(
         np.cos(0.15), abs=1e-6
@@ -147,7 +151,7 @@ def test_both_carpal_angles_turn_the_thumb_metacarpal(dof: str):
 
 def test_thumb_mcp_turns_the_proximal_and_leaves_the_metacarpal():
     bent = np.zeros(20)
-    bent[DOF_NAMES.index("THUMB_MCP_FE")] = 0.3
+    bent[HAND.angle_names.index("THUMB_MCP_FE")] = 0.3
     flat, turned = joints_of("right", IDENTITY, np.zeros(20)), joints_of("right", IDENTITY, bent)
     same = np.all(np.isclose(flat, turned, atol=1e-12), axis=1)
     changed = {OPENXR_JOINT_NAMES[i] for i in np.flatnonzero(~same)}

@@ -10,15 +10,18 @@ from hypothesis.extra.numpy import arrays
 
 from manipnet.geometry import compose, quat_exp
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, DOF_LIMITS_RAD
 from manipnet.synthesis.ik.ccd import solve_ccd
-from manipnet.synthesis.ik.grasp import grasp_confidence, grip_into
+from manipnet.synthesis.ik.chains import Surface
+from manipnet.synthesis.ik.grasp import finger_confidences_into, grasp_confidence
 from manipnet.synthesis.ik.least_squares import solve_least_squares
 from manipnet.synthesis.ik.targets import mix_distances, place_targets
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
 
-LOW, HIGH = DOF_LIMITS_RAD.T
+HAND = shipped_hand()
+
+LOW, HIGH = HAND.limits.T
 FAR = np.array([5.0, 5.0, 5.0])
 NOT_TOUCHING = np.full(22, 1.0)
 fractions = arrays(np.float64, 20, elements=st.floats(0.15, 0.85))
@@ -31,14 +34,20 @@ def ball(tmp_path_factory):
     return build_shape(closed_mesh(mesh.vertices, mesh.faces, "ball"), tmp_path_factory.mktemp("cache"))
 
 
+def solve_beside(ball, predicted, targets, confidence, center, angles):
+    """Least squares with the ball at `center` of the wrist frame, from `angles` to better ones there."""
+    surface = Surface(ball.field, np.eye(3), -center, 1.0)
+    hand = HAND.skeleton, HAND.chains
+    call(solve_least_squares, *hand, predicted, targets, NOT_TOUCHING, confidence, HAND.limits, surface, angles)
+
+
 def solve(name, ball, angles, targets, center=FAR):
     """Solve with the ball at `center` of the wrist frame."""
-    solved, limits = angles.copy(), DOF_LIMITS_RAD
+    solved = angles.copy()
     if name == "ccd":
-        call(solve_ccd, angles, targets, limits, solved)
+        call(solve_ccd, HAND.skeleton, HAND.chains, angles, targets, HAND.limits, solved)
     else:
-        field, turn = ball.field, np.eye(3)
-        call(solve_least_squares, angles, targets, NOT_TOUCHING, 0.0, limits, field, turn, -center, 1.0, solved)
+        solve_beside(ball, angles, targets, 0.0, center, solved)
     return solved
 
 
@@ -47,11 +56,11 @@ def solve(name, ball, angles, targets, center=FAR):
 @given(fraction=fractions, nudge=nudges)
 def test_reachable_targets_are_reached(ball, name, within_m, fraction, nudge):
     goal = np.clip(LOW + fraction * (HIGH - LOW), LOW, HIGH)
-    targets, _ = forward_kinematics(goal)
+    targets, _ = forward_kinematics(HAND, goal)
     start = np.clip(goal + nudge, LOW, HIGH)
     solved = solve(name, ball, start, targets)
-    before = np.linalg.norm(forward_kinematics(start)[0] - targets, axis=1)
-    after = np.linalg.norm(forward_kinematics(solved)[0] - targets, axis=1)
+    before = np.linalg.norm(forward_kinematics(HAND, start)[0] - targets, axis=1)
+    after = np.linalg.norm(forward_kinematics(HAND, solved)[0] - targets, axis=1)
     assert after.max() <= max(within_m, 0.35 * before.max())
 
 
@@ -60,7 +69,7 @@ def test_reachable_targets_are_reached(ball, name, within_m, fraction, nudge):
 @given(fraction=fractions, shift=arrays(np.float64, (22, 3), elements=st.floats(-0.1, 0.1)))
 def test_limits_hold_whatever_the_targets(ball, name, fraction, shift):
     start = LOW + fraction * (HIGH - LOW)
-    targets = forward_kinematics(start)[0] + shift
+    targets = forward_kinematics(HAND, start)[0] + shift
     solved = solve(name, ball, start, targets)
     assert np.all(np.isfinite(solved))
     assert np.all(solved >= LOW)
@@ -69,18 +78,18 @@ def test_limits_hold_whatever_the_targets(ball, name, fraction, shift):
 
 def capsule_depth(positions, center):
     fraction = np.linspace(0.0, 1.0, 9)[:, None, None]
-    start, end = positions[CAPSULE_JOINTS[4:, 0]], positions[CAPSULE_JOINTS[4:, 1]]
-    gap = np.linalg.norm(start + fraction * (end - start) - center, axis=-1) - 0.03 - CAPSULE_RADII_M[4:]
+    start, end = positions[HAND.capsules[4:, 0]], positions[HAND.capsules[4:, 1]]
+    gap = np.linalg.norm(start + fraction * (end - start) - center, axis=-1) - 0.03 - HAND.radii[4:]
     return np.maximum(-gap.min(axis=0), 0.0)
 
 
 def test_fingers_leave_the_object(ball):
     start = np.tile([0.3, 0.2, 0.4, 0.3], 5)
     start[:4] = 0.0
-    positions, _ = forward_kinematics(start)
+    positions, _ = forward_kinematics(HAND, start)
     center = positions[9] + np.array([0.0, 0.0, -0.03])
     solved = solve("least_squares", ball, start, positions, center)
-    deep, left = capsule_depth(positions, center), capsule_depth(forward_kinematics(solved)[0], center)
+    deep, left = capsule_depth(positions, center), capsule_depth(forward_kinematics(HAND, solved)[0], center)
     assert deep.max() > 0.008
     assert left.max() < 0.5 * deep.max()
     assert left.mean() < 0.4 * deep.mean()
@@ -144,7 +153,7 @@ def test_a_grip_is_the_thumb_and_the_nearest_fingers():
     distances, grip = np.full(22, 0.05), np.empty(5)
     distances[5:8] = distances[18] = 0.012  # the index finger
     distances[8:11] = distances[19] = 0.016
-    call(grip_into, distances, 0.8, grip)
+    call(finger_confidences_into, HAND.chains, distances, 0.8, grip)
     assert grip[0] == grip[1] == pytest.approx(0.8)
     assert 0.0 < grip[2] < 0.8
     assert np.all(grip[3:] == 0.0)
@@ -153,28 +162,15 @@ def test_a_grip_is_the_thumb_and_the_nearest_fingers():
 def test_a_hand_that_holds_closes_on_the_object(ball):
     """Fingers that no prediction says touch come onto the surface once the hand holds."""
     start = np.tile([0.1, 0.0, 0.1, 0.1], 5)
-    positions, _ = forward_kinematics(start)
+    positions, _ = forward_kinematics(HAND, start)
     center = positions[19] + np.array([0.0, 0.0, -0.03 - 0.02])
     gaps = []
     for hold in (0.0, 1.0):
         angles = start.copy()
         for _ in range(20):
-            targets, _ = forward_kinematics(angles)
-            field, turn, limits, start_angles = ball.field, np.eye(3), DOF_LIMITS_RAD, angles.copy()
-            call(
-                solve_least_squares,
-                start_angles,
-                targets,
-                NOT_TOUCHING,
-                hold,
-                limits,
-                field,
-                turn,
-                -center,
-                1.0,
-                angles,
-            )
-        gaps.append(fingertip_gaps(forward_kinematics(angles)[0], center).min())
+            targets, _ = forward_kinematics(HAND, angles)
+            solve_beside(ball, angles.copy(), targets, hold, center, angles)
+        gaps.append(fingertip_gaps(forward_kinematics(HAND, angles)[0], center).min())
     assert gaps[0] > 0.008
     assert -0.008 < gaps[1] < 0.002
 
@@ -183,11 +179,11 @@ def test_a_finger_that_went_through_comes_out_on_the_side_it_came_from(ball):
     """From beyond the middle of the ball the nearest way out is the far side, through which no finger gets."""
     predicted = np.zeros(20)
     predicted[9:12] = 0.5
-    targets, _ = forward_kinematics(predicted)
+    targets, _ = forward_kinematics(HAND, predicted)
     center = targets[19] + np.array([0.004, 0.0, 0.006])
     assert fingertip_gaps(targets, center).min() < -0.03
     solved = solve("least_squares", ball, predicted, targets, center)
-    positions, _ = forward_kinematics(solved)
+    positions, _ = forward_kinematics(HAND, solved)
     assert fingertip_gaps(positions, center).min() > -0.01
     assert np.all(solved[9:12] < 0.45)
     np.testing.assert_allclose(solved[4:8], predicted[4:8], atol=0.05, err_msg="its neighbour stays")
@@ -195,5 +191,5 @@ def test_a_finger_that_went_through_comes_out_on_the_side_it_came_from(ball):
 
 def fingertip_gaps(positions, center):
     along = np.linspace(0.0, 1.0, 9)[:, None, None]
-    start, end = positions[CAPSULE_JOINTS[6:, 0]], positions[CAPSULE_JOINTS[6:, 1]]
-    return np.linalg.norm(start + along * (end - start) - center, axis=-1) - 0.03 - CAPSULE_RADII_M[6:]
+    start, end = positions[HAND.capsules[6:, 0]], positions[HAND.capsules[6:, 1]]
+    return np.linalg.norm(start + along * (end - start) - center, axis=-1) - 0.03 - HAND.radii[6:]

@@ -7,16 +7,23 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 import pytest
+from other_hands import three_fingered
+from tiny_bundle import write_tiny_bundle
 
+from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.model.bundle import BundleError, load_bundle
-from manipnet.synthesis.model.layout import INPUT_SIZE
+from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
+
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
 
 HAS_CUDA = "CUDAExecutionProvider" in onnxruntime.get_available_providers()
 
 
 @pytest.mark.skipif(HAS_CUDA, reason="this machine's ONNX Runtime has CUDA")
 def test_without_cuda_the_processor_does_it_and_a_line_says_why(tiny_bundle: Path, caplog) -> None:
-    rows = np.random.default_rng(0).normal(size=(3, INPUT_SIZE)).astype(np.float32)
+    rows = np.random.default_rng(0).normal(size=(3, LAYOUT.input_size)).astype(np.float32)
     wanted = load_bundle(tiny_bundle, "cpu").infer(rows)
     with caplog.at_level(logging.WARNING):
         bundle = load_bundle(tiny_bundle, "cuda")
@@ -44,4 +51,21 @@ def test_endlessly_nested_json_is_refused(tiny_bundle: Path, tmp_path: Path) -> 
     shutil.copytree(tiny_bundle, folder)
     (folder / "bundle.json").write_text('{"format": ' * 100_000)
     with pytest.raises(BundleError, match="not JSON"):
+        load_bundle(folder)
+
+
+def test_a_hand_that_messages_cannot_carry_is_refused_by_name(tmp_path: Path) -> None:
+    folder = write_tiny_bundle(tmp_path / "three", hand=three_fingered(HAND))
+    with pytest.raises(BundleError, match="the hand 'three fingers' does not fit the hands messages: it has 14 joints"):
+        load_bundle(folder)
+
+
+def test_another_hand_beside_a_model_is_refused(tiny_bundle: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "mixed"
+    shutil.copytree(tiny_bundle, folder)
+    write_hand(three_fingered(HAND), folder / HAND_FILE)
+    with pytest.raises(BundleError, match=r"hand\.npz: the hand 'three fingers' does not fit"):
+        load_bundle(folder)
+    (folder / HAND_FILE).unlink()
+    with pytest.raises(BundleError, match=r"hand\.npz: cannot be read"):
         load_bundle(folder)

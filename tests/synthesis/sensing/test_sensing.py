@@ -8,13 +8,15 @@ import trimesh
 
 from manipnet import geometry as g
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, PARENTS
-from manipnet.synthesis.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
 from manipnet.synthesis.model.features import Windows, features, joint_distances
-from manipnet.synthesis.model.layout import INPUT, INPUT_SIZE, OUTPUT_SIZE, PRESENT, SENSED, WINDOW_OFFSETS_S
+from manipnet.synthesis.model.layout import PRESENT, SENSED, WINDOW_OFFSETS_S, layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
-from manipnet.synthesis.sensing.ambient import CELL_M, CELLS, CENTER_M
+from manipnet.synthesis.sensing.ambient import CELL_M
+
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
 
 RADIUS, HALF = 0.04, 0.035
 OFF_CENTER = np.array([0.01, -0.02, 0.015])
@@ -62,8 +64,8 @@ def hands():
         follow = np.concatenate([[0.1, 0.0, -0.05], [0, 0, 0, 1.0]])
         obj[n] = g.compose(wrist[n], follow)
         obj[n, :, 3:] = smooth_window(rng, np.zeros(3), 0.1)[:, 3:]
-    low, high = DOF_LIMITS_RAD.T
-    poses = forward_kinematics(rng.uniform(low, high, (4, 20)))
+    low, high = HAND.limits.T
+    poses = forward_kinematics(HAND, rng.uniform(low, high, (4, 20)))
     mirrored = np.array([False, True, False, True])
     other = wrist[:, :, :3] + np.array([0.2, 0.0, 0.1])
     return Windows(wrist, other, obj, mirrored, np.array([1.0, 1.0, 1.3, 0.8])), *poses
@@ -76,7 +78,7 @@ def slow_features(shape, distance_of, windows, positions, rotations, n):
     W = g.quat_to_matrix(windows.wrist[n, :, 3:])
     turn = g.quat_to_matrix(windows.object[n, :, 3:])
     R0, p0 = W[PRESENT], windows.wrist[n, PRESENT, :3]
-    axes = np.concatenate([rotations[n], rotations[n][PARENTS[17:]]])
+    axes = np.concatenate([rotations[n], rotations[n][HAND.parents[17:]]])
     row["joint_positions"], row["joint_axes"] = positions[n], np.moveaxis(axes[..., :2], -1, -2)
     row["wrist_positions"] = (windows.wrist[n, :, :3] - p0) @ R0
     row["wrist_axes"] = np.moveaxis((R0.T @ W)[..., :2], -1, -2)
@@ -91,8 +93,8 @@ def slow_features(shape, distance_of, windows, positions, rotations, n):
         world = points @ W[t].T + windows.wrist[n, t, :3]
         return (world - windows.object[n, t, :3]) @ turn[t] @ flip / scale
 
-    steps = (np.arange(CELLS) - 0.5 * (CELLS - 1)) * CELL_M
-    cells = CENTER_M + np.array(list(itertools.product(steps, steps, steps)))
+    steps = (np.arange(10) - 4.5) * CELL_M
+    cells = HAND.sensors.grid_center + np.array(list(itertools.product(steps, steps, steps)))
     d = scale * distance_of(to_object(cells, PRESENT))
     meets = d < 0.5 * CELL_M
     fine = (np.array(list(itertools.product(np.linspace(-0.5, 0.5, 13), repeat=3)))) * CELL_M
@@ -100,9 +102,9 @@ def slow_features(shape, distance_of, windows, positions, rotations, n):
         meets[cell] = np.any(distance_of(to_object(cells[cell] + fine, PRESENT)) <= 0.0)
     row["ambient"] = np.where(meets, 1.0 - np.maximum(d, 0.0) / CELL_M, 0.0)
 
-    bones, weights = SENSOR_BONES, SENSOR_WEIGHTS[..., None]
-    points = positions[n][bones] + np.einsum("skij,skj->ski", rotations[n][bones], SENSOR_POINTS)
-    normals = np.einsum("skij,skj->ski", rotations[n][bones], SENSOR_NORMALS)
+    bones, weights = HAND.sensors.bones, HAND.sensors.weights[..., None]
+    points = positions[n][bones] + np.einsum("skij,skj->ski", rotations[n][bones], HAND.sensors.points)
+    normals = np.einsum("skij,skj->ski", rotations[n][bones], HAND.sensors.normals)
     points, normals = np.sum(weights * points, axis=1), np.sum(weights * normals, axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     row["proximity"], row["signed_distances"] = np.empty((6, 104)), np.empty((6, 22))
@@ -124,17 +126,17 @@ def slow_features(shape, distance_of, windows, positions, rotations, n):
 
 
 def test_sizes_are_the_papers():
-    assert (INPUT_SIZE, OUTPUT_SIZE) == (2356, 220)
+    assert (LAYOUT.input_size, LAYOUT.output_size) == (2356, 220)
 
 
 def test_features_agree_with_the_slow_version(body, hands):
     shape, distance_of = body
     windows, positions, rotations = hands
-    rows = features(shape, windows, positions, rotations)
+    rows = features(HAND, shape, windows, positions, rotations)
     tolerance = {"signed_distances": 1.2e-3, "surface_normals": 8e-2, "proximity": 3e-4}
     for n in range(len(rows)):
         slow = slow_features(shape, distance_of, windows, positions, rotations, n)
-        for name, block in INPUT.items():
+        for name, block in LAYOUT.input.items():
             fast = rows[n, block.columns].reshape(block.shape)
             expected = np.reshape(slow[name], block.shape)
             if name == "ambient":
@@ -151,6 +153,7 @@ def test_features_agree_with_the_slow_version(body, hands):
                 np.testing.assert_allclose(fast, expected, atol=tolerance.get(name, 2e-6), err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_left_hand_in_the_mirrored_scene_is_a_right_hand(body, hands, tmp_path):
     """The same scene, its object built as a mirrored mesh instead of being mirrored by the kernels."""
     shape, _ = body
@@ -159,10 +162,10 @@ def test_a_left_hand_in_the_mirrored_scene_is_a_right_hand(body, hands, tmp_path
     left = Windows(*(v[[1, 3]] for v in windows))
     as_right = left._replace(mirrored=np.zeros(2, bool))
     poses = positions[[1, 3]], rotations[[1, 3]]
-    rows = features(shape, left, *poses)
-    expected = features(build_shape(turned, tmp_path), as_right, *poses)
-    rays = np.zeros(INPUT_SIZE, bool)
-    rays[INPUT["proximity"].columns] = True
+    rows = features(HAND, shape, left, *poses)
+    expected = features(HAND, build_shape(turned, tmp_path), as_right, *poses)
+    rays = np.zeros(LAYOUT.input_size, bool)
+    rays[LAYOUT.input["proximity"].columns] = True
     assert np.mean(np.abs(rows - expected)[:, rays] > 1e-5) < 0.01
     # the two fields' grids are not mirror images of one another, so looked-up values differ a little
     assert np.mean(np.abs(rows - expected)[:, ~rays] > 2e-3) < 0.01

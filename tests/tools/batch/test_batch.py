@@ -13,11 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_server import PATIENCE_S, scene
+from live_server import PATIENCE_S
+from tracked_bodies import record_scene
 
-from manipnet.recording.mcap_file import RecordingWriter
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
-from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
 from manipnet_tools.batch.command import find_takes, take_names
 from manipnet_tools.batch.job import Job
@@ -27,16 +26,7 @@ CUBE = LIBRARY_FOLDER / "cube.ply"
 
 
 def record(path: Path, seconds: float = 1.3, prop: str = "Box") -> Path:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with RecordingWriter(path, {}) as writer:
-        for k in range(round(seconds * 120)):
-            poses = {str(name): pose for name, pose in scene(k / 120).items() if pose is not None}
-            bodies = [
-                BodySample(None, prop if name == "Box" else name, tuple(pose[:3]), tuple(pose[3:]), True)
-                for name, pose in poses.items()
-            ]
-            writer.write_bodies(BodyFrame(k / 120, k, tuple(bodies), 0.0, "test"), k * 8_333_333)
-    return path
+    return record_scene(path, seconds, names={"Box": prop})
 
 
 @pytest.fixture
@@ -147,7 +137,7 @@ def test_takes_are_found_at_any_depth_and_get_different_names(tmp_path: Path) ->
         ({"--look-ahead": "2"}, "--look-ahead is 2 s; allowed are 0 to 0.5"),
         ({"--mesh": "cube"}, "--mesh cube: must be NAME=FILE"),
         ({"--mesh": "Box=gone.obj"}, "gone.obj"),
-        ({"--model": "gone"}, "model 'gone' is no folder and no shipped bundle"),
+        ({"--model": "gone"}, "model 'gone' is neither a folder nor a shipped bundle"),
     ],
 )
 def test_options_that_no_take_could_use_are_refused_before_any_work(

@@ -9,17 +9,20 @@ import numpy as np
 import pytest
 from written_scene import scenes_at
 
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
 from manipnet.synthesis.model.features import features
-from manipnet.synthesis.model.layout import INPUT
+from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import state_of, windows_of
 from manipnet_tools.bench.shapes import gourd
 
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
+
 PATH = Path(__file__).parents[3] / "benchmarks" / "straightforward.py"
 LOOKED_UP_M = 1.5e-3
 """Far distances come from the field in the product."""
-BLOCKS = [name for name in INPUT if name not in ("ambient", "surface_normals")]
+BLOCKS = [name for name in LAYOUT.input if name not in ("ambient", "surface_normals")]
 
 
 @pytest.fixture(scope="module")
@@ -36,21 +39,21 @@ def straightforward() -> ModuleType:
 def test_it_sees_what_the_product_sees(straightforward: ModuleType, tmp_path: Path) -> None:
     shape = build_shape(gourd(600), tmp_path)
     slow = straightforward.Straightforward(shape.mesh.vertices, shape.mesh.faces, 96)
-    state = state_of(DOF_LIMITS_RAD @ [0.6, 0.4])
+    state = state_of(HAND, HAND.limits @ [0.6, 0.4])
     for scene in scenes_at(3, [shape, shape])[:2]:
-        ours = features(shape, windows_of([scene]), state.positions[None], state.rotations[None])[0]
+        ours = features(HAND, shape, windows_of([scene]), state.positions[None], state.rotations[None])[0]
         theirs = slow.features(scene, state)
         for name in BLOCKS:
-            apart = np.abs(ours - theirs)[INPUT[name].columns]
+            apart = np.abs(ours - theirs)[LAYOUT.input[name].columns]
             assert np.quantile(apart, 0.99) < LOOKED_UP_M, name
-        occupied = np.abs(ours - theirs)[INPUT["ambient"].columns] > 0.1
+        occupied = np.abs(ours - theirs)[LAYOUT.input["ambient"].columns] > 0.1
         assert occupied.mean() < 0.01, "cells whose corner touches may go either way"
-        assert np.quantile(np.abs(ours - theirs)[INPUT["surface_normals"].columns], 0.9) < 0.05
+        assert np.quantile(np.abs(ours - theirs)[LAYOUT.input["surface_normals"].columns], 0.9) < 0.05
 
 
 def test_it_ticks(straightforward: ModuleType, tmp_path: Path) -> None:
     shape = build_shape(gourd(600), tmp_path)
     slow = straightforward.Straightforward(shape.mesh.vertices, shape.mesh.faces, 96)
-    state = state_of(DOF_LIMITS_RAD @ [0.6, 0.4])
+    state = state_of(HAND, HAND.limits @ [0.6, 0.4])
     hands = slow.tick(scenes_at(3, [shape, shape])[:2], [state, state])
     assert np.isfinite(hands).all()

@@ -4,7 +4,8 @@ import pytest
 
 from manipnet.common.options import ConfigError
 from manipnet_tools.commands import calibrate
-from manipnet_tools.commands.calibrate import CalibrateOptions, report, request
+from manipnet_tools.commands.calibrate import report, request
+from manipnet_tools.commands.options import CalibrateOptions
 
 
 def test_the_options_become_one_request() -> None:

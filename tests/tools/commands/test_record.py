@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from live_server import PATIENCE_S, Sender, Stage, scene
+from tracked_bodies import record_scene
 
 from manipnet.recording.mcap_file import (
     BODIES,
@@ -23,7 +24,6 @@ from manipnet.recording.mcap_file import (
 )
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER, load_library_mesh
 from manipnet.wire import HandsMessage
-from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
 from manipnet_tools.commands.record import record_bodies, record_hands
 from manipnet_tools.takes.meshes import recorded_meshes
@@ -125,16 +125,6 @@ def frames_on_disk(path: Path) -> int:
         return sum(1 for _ in read_bodies(path))
     except RecordingError:
         return 0
-
-
-def record_scene(path: Path, seconds: float, meshes: dict[str, bytes] | None = None) -> Path:
-    """A recording of what a tracker sent during `scene`."""
-    with RecordingWriter(path, {}, meshes) as writer:
-        for k in range(round(seconds * 120) + 1):
-            poses = {str(name): pose for name, pose in scene(k / 120).items() if pose is not None}
-            bodies = [BodySample(None, name, tuple(pose[:3]), tuple(pose[3:]), True) for name, pose in poses.items()]
-            writer.write_bodies(BodyFrame(k / 120, k, tuple(bodies), 0.0, "test"), k * 8_333_333)
-    return path
 
 
 def test_a_recording_goes_in_where_the_tracker_did(stage: Stage, tmp_path: Path) -> None:

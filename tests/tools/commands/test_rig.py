@@ -101,7 +101,7 @@ class Waving:
         while not self._stopping.wait(1 / 240):
             i += 1
             bodies = [{"id": k, "p": [0.1 * k * (i % 2), 0, 0], "q": [0, 0, 0, 1]} for k in (1, 2)]
-            self._socket.send(msgpack.packb({"t": i / 240, "bodies": bodies}) or b"")
+            self._socket.send(msgpack.packb({"t": i / 240, "bodies": bodies}))
 
 
 @pytest.mark.slow

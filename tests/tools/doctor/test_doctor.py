@@ -168,7 +168,6 @@ def test_a_server_with_keys_is_asked_with_a_key(ports, capsys, monkeypatch, tmp_
     assert "none.toml does not exist" in capsys.readouterr().out
 
 
-@pytest.mark.slow
 def test_bodies_that_arrive_are_compared_with_the_rig(ports, capsys):
     stop = threading.Event()
 

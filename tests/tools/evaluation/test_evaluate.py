@@ -11,10 +11,13 @@ from rich.progress import Progress
 
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.results import CAPTURED, HOLD, MEAN, NEAREST, Fold
 from manipnet_tools.evaluation.roll_outs import evaluate, folds
 from manipnet_tools.evaluation.sweeps import noise, scale
+
+HAND = shipped_hand()
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +36,9 @@ def test_every_row_covers_every_case(results):
 def test_rows_are_what_they_are_called(results):
     assert results.rows[MEAN].average.ratio == pytest.approx(1.0)
     assert results.rows[HOLD].average.smoothness == 0.0
-    np.testing.assert_array_equal(results.rows[HOLD].hands["mug1"]["left"][0], forward_kinematics(np.zeros(20))[0])
+    np.testing.assert_array_equal(
+        results.rows[HOLD].hands["mug1"]["left"][0], forward_kinematics(HAND, np.zeros(20))[0]
+    )
     still = results.rows["still, no IK"]
     assert still.average.smoothness == pytest.approx(0.0, abs=1e-3)
     assert still.average.mpjpe_mm > results.rows[CAPTURED].average.mpjpe_mm == 0.0

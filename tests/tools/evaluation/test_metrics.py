@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from manipnet.synthesis.hand import skeleton
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.evaluation import metrics
 
+HAND = shipped_hand()
 IDENTITY = np.array([0.0, 0, 0, 0, 0, 0, 1])
 PINKY_CAPSULES = (17, 18)
 
@@ -27,7 +28,7 @@ def hand_with_pinky_at(height: float, frames: int = 1) -> np.ndarray:
 
 
 def gaps_of(positions: np.ndarray) -> metrics.Gaps:
-    return metrics.capsule_gaps(positions, np.broadcast_to(IDENTITY, (len(positions), 7)), Floor())
+    return metrics.capsule_gaps(HAND, positions, np.broadcast_to(IDENTITY, (len(positions), 7)), Floor())
 
 
 def bare_gaps(gap: list[list[float]]) -> metrics.Gaps:
@@ -36,7 +37,7 @@ def bare_gaps(gap: list[list[float]]) -> metrics.Gaps:
 
 
 def test_a_capsule_four_millimetres_deep():
-    tip, middle = skeleton.CAPSULE_RADII_M[18], skeleton.CAPSULE_RADII_M[17]
+    tip, middle = HAND.radii[18], HAND.radii[17]
     gaps = gaps_of(hand_with_pinky_at(tip - 0.004))
     assert gaps.gap[0, 18] == pytest.approx(-0.004)
     assert gaps.gap[0, 17] == pytest.approx(-0.004 - (middle - tip))
@@ -47,7 +48,7 @@ def test_a_capsule_four_millimetres_deep():
 
 
 def test_deep_frames_and_shares_count_what_they_say():
-    depth = skeleton.CAPSULE_RADII_M[18] - np.array([0.0, 0.011, 0.016, 0.02])
+    depth = HAND.radii[18] - np.array([0.0, 0.011, 0.016, 0.02])
     gaps = gaps_of(np.concatenate([hand_with_pinky_at(height) for height in depth]))
     assert metrics.deep_frames(gaps) == 0.5
     assert metrics.deeper_share(gaps) == pytest.approx(6 / (4 * 19))
@@ -58,14 +59,14 @@ def test_gaps_are_measured_in_the_object_frame():
     raised = quarter_turn + np.array([0, 0, 0.25, 0, 0, 0, 0])
     positions = np.zeros((1, 22, 3))
     positions[..., 2] = 1.0
-    gaps = metrics.capsule_gaps(positions, raised[None], Floor())
-    np.testing.assert_allclose(gaps.gap[0], 0.75 - skeleton.CAPSULE_RADII_M, atol=1e-12)
+    gaps = metrics.capsule_gaps(HAND, positions, raised[None], Floor())
+    np.testing.assert_allclose(gaps.gap[0], 0.75 - HAND.radii, atol=1e-12)
 
 
 def test_palm_capsules_start_beyond_the_wrist():
     positions = np.zeros((22, 3))
     positions[[5, 6, 7, 18], 0] = 1.0
-    axes = metrics.capsule_axes(positions)
+    axes = metrics.capsule_axes(HAND, positions)
     np.testing.assert_allclose(axes[0, :, 0], np.linspace(0.3, 1.0, 7))
     np.testing.assert_allclose(axes[7, :, 0], 1.0)
 
@@ -106,7 +107,7 @@ def test_joint_errors_leave_the_wrist_out():
     ours[1, 1:, 2] = 0.02
     ours[1, 17:, 2] = 0.05
     np.testing.assert_allclose(metrics.joint_error_m(ours, captured), [0, (16 * 0.02 + 5 * 0.05) / 21])
-    np.testing.assert_allclose(metrics.fingertip_error_m(ours, captured), [0, 0.05])
+    np.testing.assert_allclose(metrics.fingertip_error_m(HAND, ours, captured), [0, 0.05])
 
 
 def test_longest_drift():
@@ -116,11 +117,11 @@ def test_longest_drift():
 
 
 def test_only_fingertips_that_touch_in_two_frames_on_end_slide():
-    tip = skeleton.CAPSULE_RADII_M[18]
+    tip = HAND.radii[18]
     positions = hand_with_pinky_at(tip, frames=4)
     positions[:, 21, 0] = [0.0, 0.001, 0.003, 0.003]
     positions[:, 17, 0] = [0.0, 1.0, 2.0, 3.0]  # a thumb that moves, far from the floor
-    assert metrics.slide_mm_s(positions, gaps_of(positions)) == pytest.approx(60.0 * (1 + 2 + 0) / 3)
+    assert metrics.slide_mm_s(HAND, positions, gaps_of(positions)) == pytest.approx(60.0 * (1 + 2 + 0) / 3)
     positions[1, [16, 21], 1] += 0.01
-    assert metrics.slide_mm_s(positions, gaps_of(positions)) == pytest.approx(0.0)
-    assert np.isnan(metrics.slide_mm_s(positions[:1], gaps_of(positions[:1])))
+    assert metrics.slide_mm_s(HAND, positions, gaps_of(positions)) == pytest.approx(0.0)
+    assert np.isnan(metrics.slide_mm_s(HAND, positions[:1], gaps_of(positions[:1])))

@@ -14,11 +14,11 @@ from manipnet.actors.transitions import ShownHand
 from manipnet.geometry import compose, mirror_points, quat_conjugate, quat_exp, quat_log, quat_multiply, transform
 from manipnet.recording.mcap_file import RecordingWriter, mesh_file
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD, DOF_NAMES, JOINT_NAMES, OFFSETS_M
-from manipnet.synthesis.hand.surface import FACES, skin
+from manipnet.synthesis.hand.skin import skinned
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.synthesizer import hand_to_world
-from manipnet.wire import BodyPose, HandsMessage
+from manipnet.wire import BodyPose, HandsMessage, State
 from manipnet_tools import cli
 from manipnet_tools.export.animation import Animation, ExportError, HandTrack, hand_track, read_animation
 from manipnet_tools.export.bvh_out import write_bvh
@@ -26,6 +26,8 @@ from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf
 from manipnet_tools.takes.bvh_motion import read_bvh
 from manipnet_tools.takes.take import BodyTrack, read_take
+
+HAND = shipped_hand()
 
 FRAMES = 40
 SIDES = ("left", "right")
@@ -43,7 +45,7 @@ def angles() -> dict[str, np.ndarray]:
     """Angles `(T, 20)` of two hands that move through all they can."""
     rng = np.random.default_rng(3)
     share = 0.5 + 0.45 * np.sin(np.linspace(0.0, 6.0, FRAMES)[:, None] + rng.uniform(0.0, 6.0, (2, 1, 20)))
-    low, high = DOF_LIMITS_RAD.T
+    low, high = HAND.limits.T
     return dict(zip(SIDES, low + share * (high - low), strict=True))
 
 
@@ -52,9 +54,9 @@ def animation(angles: dict[str, np.ndarray]) -> Animation:
     """Two hands and two props, of which one has a mesh."""
     rng = np.random.default_rng(4)
     hands = {}
-    for side, away_m in (("left", -0.2), ("right", 0.2)):
-        positions, rotations = forward_kinematics(angles[side])
-        hands[side] = hand_track(*hand_to_world(side, path_of(rng, away_m), positions, rotations))
+    for side, away_m in zip(SIDES, (-0.2, 0.2), strict=True):
+        positions, rotations = forward_kinematics(HAND, angles[side])
+        hands[side] = hand_track(HAND, *hand_to_world(side, path_of(rng, away_m), positions, rotations))
     seen = np.arange(FRAMES) != 7
     objects = {name: BodyTrack(path_of(rng, 0.0), seen) for name in ("Box", "the cup")}
     meshes = {"Box": load_library_mesh("mug")}
@@ -81,7 +83,7 @@ def test_bvh_comes_back_as_it_was(animation: Animation, tmp_path: Path) -> None:
 
 def test_a_captured_take_comes_back_as_it_was(manipnet_data: Path, tmp_path: Path) -> None:
     source = manipnet_data / "BVH" / "mug1"
-    write_bvh(read_animation(source), tmp_path / "take")
+    write_bvh(read_animation(source, HAND), tmp_path / "take")
     before, after = read_take(source), read_take(tmp_path / "take")
     assert (after.rate_hz, after.objects) == (before.rate_hz, before.objects)
     for side in SIDES:
@@ -158,7 +160,7 @@ def test_gltf_skins_the_hands_as_we_do(animation: Animation, angles, tmp_path: P
     write_gltf(animation, tmp_path / "juggle.glb")
     gltf = Gltf(tmp_path / "juggle.glb")
     for side in SIDES:
-        vertices = skin(*forward_kinematics(angles[side][frame]))
+        vertices = skinned(HAND, *forward_kinematics(HAND, angles[side][frame]))
         vertices = mirror_points(vertices) if side == "left" else vertices
         assert np.allclose(
             gltf.skinned(f"{side}_hand", frame), transform(animation.hands[side].wrist[frame], vertices), atol=2e-6
@@ -167,7 +169,7 @@ def test_gltf_skins_the_hands_as_we_do(animation: Animation, angles, tmp_path: P
     for name, body in animation.objects.items():
         assert np.allclose(gltf.poses(frame)[names.index(name)][:3], body.poses[frame, :3], atol=1e-6)
     tips = gltf.poses(frame)[names.index("right_INDEX_TIP")][:3]
-    assert np.allclose(tips, animation.hands["right"].world()[0][frame, JOINT_NAMES.index("INDEX_TIP")], atol=1e-6)
+    assert np.allclose(tips, animation.hands["right"].world()[0][frame, HAND.joint_names.index("INDEX_TIP")], atol=1e-6)
 
 
 def test_gltf_faces_look_outward_and_time_starts_at_zero(animation: Animation, tmp_path: Path) -> None:
@@ -208,7 +210,7 @@ def test_a_stranger_reads_the_file(animation: Animation, tmp_path: Path) -> None
     write_gltf(animation, tmp_path / "juggle.glb")
     scene = trimesh.load_scene(tmp_path / "juggle.glb")
     assert {"left_hand", "right_hand", "Box"} <= set(scene.geometry)
-    assert len(scene.geometry["right_hand"].faces) == len(FACES)
+    assert len(scene.geometry["right_hand"].faces) == len(HAND.skin.faces)
 
 
 def test_csv_names_every_number(animation: Animation, angles, tmp_path: Path) -> None:
@@ -219,10 +221,10 @@ def test_csv_names_every_number(animation: Animation, angles, tmp_path: Path) ->
     row = rows[7]
     assert (row["frame"], float(row["time_s"])) == ("7", pytest.approx(0.5 + 7 / 60))
     for side in SIDES:
-        read = [float(row[f"{side}_{name.lower()}_rad"]) for name in DOF_NAMES]
+        read = [float(row[f"{side}_{name.lower()}_rad"]) for name in HAND.angle_names]
         assert np.allclose(read, angles[side][7], atol=1e-6)
         joints = animation.hands[side].world()[0][7]
-        read = [[float(row[f"{side}_{name.lower()}_{axis}"]) for axis in "xyz"] for name in JOINT_NAMES]
+        read = [[float(row[f"{side}_{name.lower()}_{axis}"]) for axis in "xyz"] for name in HAND.joint_names]
         assert np.allclose(read, joints, atol=1e-6)
     read = [float(row[f"the cup_{part}"]) for part in ("x", "y", "z", "qx", "qy", "qz", "qw")]
     assert np.allclose(read, animation.objects["the cup"].poses[7], atol=1e-6)
@@ -231,18 +233,18 @@ def test_csv_names_every_number(animation: Animation, angles, tmp_path: Path) ->
 
 def test_a_hand_of_another_size_is_exported_at_its_size(animation: Animation, angles, tmp_path: Path) -> None:
     hand = animation.hands["right"]
-    small = HandTrack(hand.wrist, hand.rotations, 0.9 * OFFSETS_M, hand.live)
+    small = HandTrack(HAND, hand.wrist, hand.rotations, 0.9 * HAND.offsets, hand.live)
     write_gltf(Animation("small", 60.0, animation.time_s, {"right": small}), tmp_path / "small.glb")
-    vertices = 0.9 * skin(*forward_kinematics(angles["right"][5]))
+    vertices = 0.9 * skinned(HAND, *forward_kinematics(HAND, angles["right"][5]))
     assert np.allclose(
         Gltf(tmp_path / "small.glb").skinned("right_hand", 5), transform(hand.wrist[5], vertices), atol=2e-6
     )
 
 
-def message(seq: int, t_s: float, x: float, state: str = "live", actor: str = "ann") -> HandsMessage:
+def message(seq: int, t_s: float, x: float, state: State = "live", actor: str = "ann") -> HandsMessage:
     """A hands message of a half-closed left hand at `x`."""
-    shown = ShownHand(state, DOF_LIMITS_RAD @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), "Box")
-    hands = hand_poses({"left": shown}, 0.9)
+    shown = ShownHand(state, HAND.limits @ [0.5, 0.5], np.array([x, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]), "Box")
+    hands = hand_poses(HAND, {"left": shown}, 0.9)
     pose = np.array([x, 1.1, 0.0, 0.0, 0.0, 0.0, 1.0])
     bodies = (BodyPose(True, pose, "left_wrist"), BodyPose(state == "live", pose, "Box"))
     return HandsMessage("session", actor, seq, t_s, t_s + 0.6, 0.5, hands, bodies)
@@ -264,7 +266,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_a_recording_is_exported_tick_by_tick(recording: Path, tmp_path: Path, angles) -> None:
-    stage = read_animation(recording)
+    stage = read_animation(recording, HAND)
     assert (len(stage.time_s), stage.rate_hz, list(stage.hands), list(stage.objects)) == (60, 60.0, ["left"], ["Box"])
     hand = stage.hands["left"]
     assert np.flatnonzero(~hand.live).tolist() == [20, 21, 30, 31, 32, 33, 34]
@@ -272,8 +274,8 @@ def test_a_recording_is_exported_tick_by_tick(recording: Path, tmp_path: Path, a
     assert hand.scale == pytest.approx(0.9)
     assert stage.objects["Box"].tracked.sum() == 53
     assert np.ptp(stage.meshes["Box"].vertices) == pytest.approx(0.5 * np.ptp(load_library_mesh("cube").vertices))
-    assert read_animation(recording, "bob").hands["left"].wrist[0, 0] == 5.0
-    positions, rotations = forward_kinematics(DOF_LIMITS_RAD @ [0.5, 0.5])
+    assert read_animation(recording, HAND, "bob").hands["left"].wrist[0, 0] == 5.0
+    positions, rotations = forward_kinematics(HAND, HAND.limits @ [0.5, 0.5])
     joints, _ = hand_to_world("left", hand.wrist[3], 0.9 * positions, rotations)
     assert np.allclose(hand.world()[0][3], joints, atol=1e-9)
 

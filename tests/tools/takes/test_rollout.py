@@ -8,11 +8,15 @@ import pytest
 from manipnet import geometry
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import Synthesizer
+from manipnet.wire import SIDES
 from manipnet_tools.takes.rollout import hand_inputs, roll_out, tick_take
 from manipnet_tools.takes.take import BodyTrack, Take
+
+HAND = shipped_hand()
 
 NAMES = ("left_wrist", "right_wrist", "box")
 VELOCITY = np.array([0.1, -0.2, 0.3])
@@ -90,7 +94,7 @@ def test_each_hand_deals_with_the_nearest_object():
     take = still_take(left_wrist=(-0.3, 1, 0), right_wrist=(0.3, 1, 0), one=(-0.42, 1, -0.1), two=(0.4, 1, -0.1))
     shapes = {"one": cube(), "two": cube(0.05)}
     inputs = hand_inputs(tick_take(take), shapes)
-    for side, name in (("left", "one"), ("right", "two")):
+    for side, name in zip(SIDES, ("one", "two"), strict=True):
         scene = inputs[side].scene(7)
         assert scene.shape is shapes[name]
         np.testing.assert_allclose(scene.object[3], take.bodies[name].poses[0])
@@ -118,7 +122,7 @@ def test_hands_of_different_lengths_are_rolled_out_together(still_model):
     assert [len(motion.positions) for motion in motions] == [3, len(inputs["right"])]
     assert sum(heard) == 3 + len(inputs["right"])
     for motion in motions:
-        positions, _ = forward_kinematics(motion.angles)
+        positions, _ = forward_kinematics(HAND, motion.angles)
         np.testing.assert_allclose(motion.positions, positions)
         np.testing.assert_allclose(motion.raw_positions, positions)
         np.testing.assert_allclose(motion.distances, 0.035)

@@ -143,7 +143,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(TakeError, match=r"allowed are a folder of BVH files, \.txt, \.csv, \.mcap"):
         read_take(tmp_path / "a.fbx")
     (tmp_path / "a.mcap").write_bytes(b"?")
-    with pytest.raises(TakeError, match="is no recording"):
+    with pytest.raises(TakeError, match="not a recording"):
         read_take(tmp_path / "a.mcap")
 
 

@@ -7,24 +7,28 @@ import pytest
 onnx = pytest.importorskip("onnx", reason="onnx is not installed: python -m pip install onnx")
 
 from manipnet.synthesis.model.bundle import open_session
-from manipnet.synthesis.model.layout import INPUT_SIZE
+from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.bench.reference import full_graph
 from manipnet_tools.training import quantise as compress
+
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
 
 WIDTH = 192
 
 
 @pytest.fixture(scope="module")
 def graph() -> bytes:
-    return full_graph(np.zeros(20), WIDTH)
+    return full_graph(HAND, np.zeros(20), WIDTH)
 
 
 def _answers(graph: bytes, rows: np.ndarray) -> np.ndarray:
-    return np.asarray(open_session("graph", graph).run(None, {"features": rows})[0])
+    return np.asarray(open_session("graph", graph, LAYOUT).run(None, {"features": rows})[0])
 
 
 def test_wide_layers_answer_nearly_the_same_in_4_bits(graph: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = np.random.default_rng(0).normal(size=(8, INPUT_SIZE)).astype(np.float32)
+    rows = np.random.default_rng(0).normal(size=(8, LAYOUT.input_size)).astype(np.float32)
     exact = _answers(graph, rows)
     wrong = {}
     for wide in (1024, 128):
@@ -35,7 +39,7 @@ def test_wide_layers_answer_nearly_the_same_in_4_bits(graph: bytes, monkeypatch:
 
 
 def test_one_large_input_does_not_make_the_others_coarse(graph: bytes) -> None:
-    rows = np.random.default_rng(0).normal(size=(8, INPUT_SIZE)).astype(np.float32)
+    rows = np.random.default_rng(0).normal(size=(8, LAYOUT.input_size)).astype(np.float32)
     rows[:, 1000] = 60.0
     exact, quantised = _answers(graph, rows), _answers(compress.quantise_weights(graph), rows)
     wrong = exact - quantised

@@ -11,9 +11,9 @@ import trimesh
 torch = pytest.importorskip("torch", reason="training needs the train extra")
 
 from manipnet.geometry import quat_exp
-from manipnet.synthesis.hand.skeleton import DOF_LIMITS_RAD
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.layout import INPUT, INPUT_SIZE
+from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet_tools.evaluation import ablate
@@ -21,6 +21,9 @@ from manipnet_tools.training import quantise as compress
 from manipnet_tools.training.dataset import HandTrack
 from manipnet_tools.training.model import hidden_columns
 from manipnet_tools.training.train import FUTURE_FRAMES, Learner, Lessons, TrainConfig, save_bundle, train
+
+HAND = shipped_hand()
+LAYOUT = layout_of(HAND)
 
 torch.set_num_threads(1)
 FRAMES = 480
@@ -34,11 +37,11 @@ def tracks(tmp_path_factory):
     shape = build_shape(closed_mesh(ball.vertices, ball.faces, "ball"), tmp_path_factory.mktemp("cache"))
     t = np.arange(FRAMES) / 120.0
     closed = 0.5 + 0.5 * np.sin(2.0 * t)
-    angles = DOF_LIMITS_RAD[:, 0] + (0.3 + 0.4 * closed[:, None]) * (DOF_LIMITS_RAD[:, 1] - DOF_LIMITS_RAD[:, 0])
+    angles = HAND.limits[:, 0] + (0.3 + 0.4 * closed[:, None]) * (HAND.limits[:, 1] - HAND.limits[:, 0])
     wrist = np.stack([np.concatenate([[0.0, 1.0, 0.1 * s], quat_exp(np.array([0.0, 0.2 * s, 0.0]))]) for s in closed])
     obj = np.tile([0.1, 0.97, 0.0, 0.0, 0.0, 0.0, 1.0], (FRAMES, 1))
     other = np.tile([0.5, 1.0, 0.0], (FRAMES, 1))
-    return [HandTrack(f"take{k}/right", shape, bool(k), wrist, other, obj, angles) for k in range(2)]
+    return [HandTrack(f"take{k}/right", HAND, shape, bool(k), wrist, other, obj, angles) for k in range(2)]
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +66,7 @@ def test_frames_behind_the_share_are_never_learned_from(tracks):
     last = int(FRAMES * share)
     torn = [replace(track, angles=track.angles.copy(), wrist=track.wrist.copy()) for track in tracks]
     for track in torn:
-        track.angles[last:] = DOF_LIMITS_RAD[:, 0]
+        track.angles[last:] = HAND.limits[:, 0]
         track.wrist[last:, :3] += 1.0
     config = replace(TINY, warp=0.0)
     assert last > 2 * FUTURE_FRAMES
@@ -76,7 +79,7 @@ def test_a_model_learns(tracks):
     lessons = Lessons(tracks, TINY, 1.0)
     samples = lessons.next_round(None)
     torch.manual_seed(0)
-    learner = Learner(samples, replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0))
+    learner = Learner(HAND, samples, replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0))
     assert learner.learn(samples) < 0.5, "squared deviations, of which a constant answer leaves one"
 
 
@@ -92,7 +95,7 @@ def test_training_is_the_same_for_the_same_seed(tracks, learned):
 def test_a_bundle_answers_like_its_model_and_tells_its_origin(learned, tmp_path):
     save_bundle(learned, tmp_path / "mine")
     bundle = load_bundle(tmp_path / "mine")
-    rows = np.random.default_rng(0).normal(0.0, 0.1, (3, INPUT_SIZE)).astype(np.float32)
+    rows = np.random.default_rng(0).normal(0.0, 0.1, (3, LAYOUT.input_size)).astype(np.float32)
     with torch.no_grad():
         expected = learned.model(torch.from_numpy(rows)).numpy()
     np.testing.assert_allclose(bundle.infer(rows), expected, atol=2e-2)
@@ -115,11 +118,11 @@ def test_a_quantised_bundle_is_smaller_and_nearly_the_same(tracks, tmp_path):
 
 def test_hidden_inputs_do_not_reach_the_network(tracks, tmp_path):
     blind = train(tracks, replace(TINY, rounds=1, epochs_per_round=1, hidden=("ambient", "future")))
-    rows = np.zeros((1, INPUT_SIZE), np.float32)
-    changed = rows + hidden_columns(("ambient", "future")) * np.float32(3.0)
+    rows = np.zeros((1, LAYOUT.input_size), np.float32)
+    changed = rows + hidden_columns(LAYOUT, ("ambient", "future")) * np.float32(3.0)
     with torch.no_grad():
         assert torch.equal(blind.model(torch.from_numpy(rows)), blind.model(torch.from_numpy(changed)))
-        changed[:, INPUT["proximity"].start] = 1.0
+        changed[:, LAYOUT.input["proximity"].start] = 1.0
         assert not torch.equal(blind.model(torch.from_numpy(rows)), blind.model(torch.from_numpy(changed)))
 
 

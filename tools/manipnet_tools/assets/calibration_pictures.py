@@ -7,10 +7,10 @@ from typing import Any, Final
 import numpy as np
 
 from manipnet.actors.calibration import HAND_LENGTH_M, MARK_M, wrist_on_sheet
-from manipnet.geometry import Array, mirror_points, transform
+from manipnet.geometry import Array, Side, mirror_points, transform
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.surface import FACES, skin
-from manipnet.synthesis.synthesizer import Side
+from manipnet.synthesis.hand.skin import skinned
+from manipnet.synthesis.model.shipped import shipped_hand
 
 HOUSE: Final = Path(__file__).parents[3]
 IMAGES, PAGE = HOUSE / "docs" / "images", HOUSE / "server" / "manipnet" / "page"
@@ -74,11 +74,12 @@ def _drawn_back() -> Array:
 
 def _draw_hand(draw: Any, side: Side, moved: Array) -> None:
     """A flat hand, lit from above, and the marker cluster on its back."""
-    positions, rotations = forward_kinematics(np.zeros(20))
-    vertices, faces = skin(positions, rotations), FACES
+    hand = shipped_hand()
+    vertices = skinned(hand, *forward_kinematics(hand, np.zeros(hand.angle_count)))
+    faces = hand.skin.faces
     cluster = np.array([[-0.035, 0.02, 0.03], [-0.035, -0.02, 0.03], [0.0, 0.0, 0.03]])
     if side == "left":
-        vertices, cluster, faces = mirror_points(vertices), mirror_points(cluster), FACES[:, ::-1]
+        vertices, cluster, faces = mirror_points(vertices), mirror_points(cluster), faces[:, ::-1]
     wrist = wrist_on_sheet(side) + moved
     corners, markers = transform(wrist, vertices)[faces], transform(wrist, cluster)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

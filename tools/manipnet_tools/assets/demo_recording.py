@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from manipnet.demo.player import DEMO_FILE
+from manipnet.geometry import Side
 from manipnet.recording.mcap_file import RecordingWriter
-from manipnet.synthesis.synthesizer import Side
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.assets.choreography import Grasp, Rest, hand_pose, object_pose, perform
 from manipnet_tools.assets.minimum_jerk import Move

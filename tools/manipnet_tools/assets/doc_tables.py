@@ -1,6 +1,7 @@
 """Writes the tables of the documentation that follow from declarations: `python -m manipnet_tools.assets.doc_tables`.
 
-A table lies between the comments `<!-- table NAME -->` and `<!-- end of table -->` of any page in `docs/`.
+In any page of `docs/`, a table is between the comments `<!-- table NAME -->` and `<!-- end of table -->`, each of which
+is separated from it by an empty line.
 """
 
 import re
@@ -14,7 +15,7 @@ from manipnet.common.options import HostPort, Protocol
 from manipnet.config.settings import all_options
 
 DOCS: Final = Path(__file__).parents[3] / "docs"
-_MARKED: Final = re.compile(r"(<!-- table (\w+) -->\n).*?(<!-- end of table -->)", re.DOTALL)
+_MARKED: Final = re.compile(r"(<!-- table (\w+) -->\n\n).*?(\n<!-- end of table -->)", re.DOTALL)
 
 
 def options_table() -> str:

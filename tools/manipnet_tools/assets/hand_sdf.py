@@ -1,20 +1,17 @@
 """The shape of the hand as a signed distance: tapered capsules around the bones, melted into a palm and a thumb web.
 
 Everything is in the wrist frame of a right hand in the bind pose, metres. The fingers melt into the palm but not into
-one another. Radii follow `skeleton.CAPSULE_RADII_M` where objects are touched; the tips are slimmer than their capsules
-and hang back behind the tip joint, because on captured grasps the tip joints lie on the pads, not inside the finger.
+one another. Radii follow the capsules of the dataset's subject where objects are touched; the tips are slimmer than
+their capsules and hang back behind the tip joint, because on captured grasps the tip joints lie on the pads, not inside
+the finger.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from manipnet.synthesis.hand.bind_pose import BIND_ANGLES_RAD
-from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import FINGER_JOINTS
-
-Array = NDArray[np.float64]
+from manipnet.geometry import Array
+from manipnet.synthesis.hand.hand import Hand
 
 _MELT_PALM_M = 2.5e-3
 _MELT_FINGER_M = 0.8e-3
@@ -94,34 +91,31 @@ class HandShape:
         return distances
 
 
-def bind_shape() -> HandShape:
-    """The hand in the bind pose."""
-    joints, rotations = forward_kinematics(BIND_ANGLES_RAD)
+def bind_shape(hand: Hand, joints: Array, rotations: Array) -> HandShape:
+    """The flesh about the `joints (J, 3)` of the hand of the dataset's subject; its bones are `rotations (B, 3, 3)`."""
     palm = [_cone_mm(0, *flesh) for flesh in (*_WRIST_FLESH, *_WEB_FLESH)]
     palm += [_cone_mm(2, *flesh) for flesh in _THENAR_FLESH]
-    palm += [_metacarpal(joints[chain[0]], k) for k, chain in enumerate(FINGER_JOINTS[1:])]
-    fingers = tuple(_chain(joints, rotations, f) for f in range(5))
+    palm += [_metacarpal(joints[chain[0]], k) for k, chain in enumerate(hand.fingers[1:])]
+    fingers = tuple(_chain(hand, joints, rotations, f) for f in range(5))
     return HandShape(tuple(palm), fingers)
 
 
-def palmar_directions(joints: Array, rotations: Array) -> Array:
+def palmar_directions(hand: Hand, joints: Array, rotations: Array) -> Array:
     """Unit direction out of the palm side of each bone, `(17, 3)`: where flexion takes the bone."""
-    from manipnet.synthesis.hand.skeleton import DOF_AXES, DOF_JOINTS, PARENTS
-
-    directions = np.tile([0.0, 0.0, -1.0], (17, 1))
-    for dof, bone in reversed(list(enumerate(DOF_JOINTS))):
-        child = int(np.argmax(bone == PARENTS))
-        axis = rotations[PARENTS[bone]] @ DOF_AXES[dof]
+    directions = np.tile([0.0, 0.0, -1.0], (hand.bone_count, 1))
+    for angle, bone in reversed(list(enumerate(hand.angle_bones))):
+        child = int(np.argmax(bone == hand.parents))
+        axis = rotations[hand.parents[bone]] @ hand.axes[angle]
         along = joints[child] - joints[bone]
         directions[bone] = np.cross(axis, along)
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-def _chain(joints: Array, rotations: Array, finger: int) -> tuple[Cone, ...]:
-    chain = list(FINGER_JOINTS[finger][-4:])
+def _chain(hand: Hand, joints: Array, rotations: Array, finger: int) -> tuple[Cone, ...]:
+    chain = list(hand.fingers[finger][-4:])
     centres = joints[chain].copy()
     bone = chain[-2]
-    palmar = palmar_directions(joints, rotations)[bone]
+    palmar = palmar_directions(hand, joints, rotations)[bone]
     along = centres[3] - centres[2]
     along /= np.linalg.norm(along)
     centres[3] -= 1e-3 * _TIP_BACK_MM[finger] * (palmar + 0.6 * along)

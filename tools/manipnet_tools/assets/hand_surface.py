@@ -1,18 +1,18 @@
-"""Builds `manipnet/synthesis/hand/surface.npz`: the hand's skin, how it follows the bones, and where its sensors sit.
+"""Make the skin and the sensors of the shipped hand again: `python -m manipnet_tools.assets.hand_surface`.
 
-python -m manipnet_tools.assets.hand_surface
+It rewrites `hand.npz` of every shipped bundle. A model is trained on its sensors, so changing them makes it unusable.
 """
 
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-import manipnet.synthesis.hand
 from manipnet.geometry import Array
-from manipnet.synthesis.hand.bind_pose import BIND_ANGLES_RAD
+from manipnet.synthesis.hand.hand import Hand, Sensors, Skin
+from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import BONE_COUNT, PARENTS
+from manipnet.synthesis.model.shipped import models_folder, shipped_hand, shipped_models
 from manipnet_tools.assets.hand_sdf import HandShape, bind_shape, palmar_directions
 from manipnet_tools.assets.surface_nets import extract, neighbour_mean, polish
 
@@ -27,42 +27,42 @@ PALMAR_COSINE = 0.45
 """A vertex belongs to the palm side if its normal is within about 63 degrees of where flexion takes its bone."""
 
 
-def build() -> dict[str, np.ndarray]:
-    """All arrays of the data file."""
-    shape = bind_shape()
-    joints, rotations = forward_kinematics(BIND_ANGLES_RAD)
+def with_surface(hand: Hand) -> Hand:
+    """The hand with a new skin and new sensors about its bones."""
+    joints, rotations = forward_kinematics(hand, hand.skin.bind_angles)
+    shape = bind_shape(hand, joints, rotations)
     low, high = joints.min(axis=0) - 0.05, joints.max(axis=0) + 0.05
     low[0] = -0.07
     vertices, faces = extract(shape.distance, low, high, CELL_M)
     vertices, normals = polish(shape.distance, vertices, faces, POLISH_ROUNDS)
-    weights = skin_weights(shape, vertices, faces)
+    weights = skin_weights(hand, shape, vertices, faces)
     bones, top = _strongest(weights, BONES_PER_VERTEX)
-    sensors = choose_sensors(vertices, normals, weights, faces, palmar_directions(joints, rotations), joints)
-    sensor_bones, sensor_weights = _strongest(weights[sensors], SENSOR_BONES)
+    skin = Skin(vertices, faces.astype(np.int32), bones, top, hand.skin.bind_angles)
+    palmar = palmar_directions(hand, joints, rotations)
+    chosen = choose_sensors(vertices, normals, weights, palmar, joints)
+    sensor_bones, sensor_weights = _strongest(weights[chosen], SENSOR_BONES)
     to_bone = np.swapaxes(rotations, 1, 2)[sensor_bones]
-    relative = vertices[sensors][:, None] - joints[sensor_bones]
-    return {
-        "vertices": vertices.astype(np.float32),
-        "faces": faces.astype(np.uint16),
-        "bones": bones.astype(np.uint8),
-        "weights": top.astype(np.float32),
-        "sensor_bones": sensor_bones.astype(np.uint8),
-        "sensor_weights": sensor_weights,
-        "sensor_points": np.einsum("skij,skj->ski", to_bone, relative),
-        "sensor_normals": np.einsum("skij,sj->ski", to_bone, normals[sensors]),
-    }
+    relative = vertices[chosen][:, None] - joints[sensor_bones]
+    sensors = Sensors(
+        sensor_bones,
+        sensor_weights,
+        np.einsum("skij,skj->ski", to_bone, relative),
+        np.einsum("skij,sj->ski", to_bone, normals[chosen]),
+        hand.sensors.grid_center,
+    )
+    return replace(hand, skin=skin, sensors=sensors)
 
 
-def skin_weights(shape: HandShape, vertices: Array, faces: NDArray) -> Array:
-    """Weights `(V, 17)` that sum to one: nearness to each bone's flesh, smoothed along the skin.
+def skin_weights(hand: Hand, shape: HandShape, vertices: Array, faces: NDArray) -> Array:
+    """Weights `(V, B)` that sum to one: nearness to each bone's flesh, smoothed along the skin.
 
     A bone shares only with its parent and children, so that fingers never drag their neighbours along.
     """
     distance = shape.bone_distances(vertices)
     main = distance.argmin(axis=1)
-    related = np.eye(BONE_COUNT, dtype=bool)
-    for bone in range(1, BONE_COUNT):
-        related[bone, PARENTS[bone]] = related[PARENTS[bone], bone] = True
+    related = np.eye(hand.bone_count, dtype=bool)
+    for bone in range(1, hand.bone_count):
+        related[bone, hand.parents[bone]] = related[hand.parents[bone], bone] = True
     related[2, 0] = related[0, 2] = True  # bone 1 has no flesh of its own
     nearness = np.exp(-(distance - distance.min(axis=1, keepdims=True)) / WEIGHT_FALLOFF_M)
     weights = np.where(related[main], nearness, 0.0)
@@ -71,9 +71,7 @@ def skin_weights(shape: HandShape, vertices: Array, faces: NDArray) -> Array:
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def choose_sensors(
-    vertices: Array, normals: Array, weights: Array, faces: NDArray, palmar: Array, joints: Array
-) -> NDArray[np.int64]:
+def choose_sensors(vertices: Array, normals: Array, weights: Array, palmar: Array, joints: Array) -> NDArray[np.int64]:
     """Vertices of the palm side, spread evenly by farthest-point sampling from the middle of the palm on."""
     facing = np.sum(normals * palmar[weights.argmax(axis=1)], axis=1) > PALMAR_COSINE
     beyond_wrist = vertices[:, 0] > 0.012
@@ -95,11 +93,12 @@ def _strongest(weights: Array, count: int) -> tuple[NDArray[np.int64], Array]:
 
 
 def main() -> None:
-    """Write the data file into the package."""
-    path = Path(manipnet.synthesis.hand.__path__[0]) / "surface.npz"
-    arrays = build()
-    np.savez_compressed(path, allow_pickle=False, **arrays)
-    print(f"{path}: {len(arrays['vertices'])} vertices, {len(arrays['faces'])} faces, {path.stat().st_size} bytes")
+    """Rewrite the hand of every shipped bundle."""
+    for model in shipped_models():
+        path = models_folder() / model / HAND_FILE
+        hand = with_surface(shipped_hand(model))
+        write_hand(hand, path)
+        print(f"{path}: {len(hand.skin.vertices)} vertices, {hand.sensor_count} sensors, {path.stat().st_size} bytes")
 
 
 if __name__ == "__main__":

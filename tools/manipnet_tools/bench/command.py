@@ -26,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     full = full_width(bundle)
     performance = _performance(arguments.take, arguments.mesh)
     beside = tuple(load_bundle(model, arguments.provider) for model in arguments.beside)
-    bench = Bench(bundle, performance, full, forward_pass(full.content), arguments.seconds, beside)
+    bench = Bench(bundle, performance, full, forward_pass(full.content, full.bundle.layout), arguments.seconds, beside)
     figures: Figures = {}
     for name in arguments.only or USUAL:
         print(f"… {name}", file=sys.stderr, flush=True)

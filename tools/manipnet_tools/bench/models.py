@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manipnet.synthesis.model.bundle import Bundle, BundleError, load_bundle, open_session
-from manipnet.synthesis.model.layout import OUTPUT
 from manipnet_tools.bench.reference import full_graph
 
 FULL = "manipnet-full-int8"
@@ -24,8 +23,8 @@ def full_width(small: Bundle) -> FullWidth:
 
     Raises `ModuleNotFoundError` without the onnx to make a graph.
     """
-    graph = full_graph(small.rest_angles)
-    return FullWidth(graph, replace(small, name="full width", session=open_session("full width", graph)))
+    graph = full_graph(small.hand, small.rest_angles)
+    return FullWidth(graph, replace(small, name="full width", session=open_session("full width", graph, small.layout)))
 
 
 def shipped_full_width() -> Bundle | None:
@@ -40,12 +39,12 @@ def quantised(full: FullWidth) -> Bundle:
     """The same with 8-bit weights. Raises `ModuleNotFoundError` without onnx."""
     from manipnet_tools.training.quantise import quantise_weights
 
-    session = open_session("quantised", quantise_weights(full.content))
+    session = open_session("quantised", quantise_weights(full.content), full.bundle.layout)
     return replace(full.bundle, name="full width, quantised", session=session)
 
 
 def apart_m(a: Bundle, b: Bundle, rows: np.ndarray) -> float:
-    """How far two bundles put any joint from each other at worst, on the same feature `rows (N, 2356)`; metres."""
+    """The largest distance between the joints of two bundles on the same feature `rows (N, input_size)`, metres."""
     difference = a.infer(rows) - b.infer(rows)
-    joints = difference[:, OUTPUT["joint_positions"].columns].reshape(len(rows), -1, 3)
+    joints = difference[:, a.layout.output["joint_positions"].columns].reshape(len(rows), -1, 3)
     return float(np.linalg.norm(joints, axis=-1).max())

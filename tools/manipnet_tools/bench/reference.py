@@ -5,24 +5,25 @@ from collections.abc import Callable
 import numpy as np
 import onnxruntime
 
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import open_session
 from manipnet.synthesis.model.features import pose_outputs
-from manipnet.synthesis.model.layout import ENCODED, INPUT_SIZE, OUTPUT_SIZE
+from manipnet.synthesis.model.layout import Layout, layout_of
 
 WIDTH = 1536
 HANDS = 2
 
 
-def full_graph(rest_angles: np.ndarray, width: int = WIDTH) -> bytes:
-    """The network of the paper as ONNX with random weights, answering nearly the pose of `rest_angles (20,)`.
+def full_graph(hand: Hand, rest_angles: np.ndarray, width: int = WIDTH) -> bytes:
+    """The network of the paper as ONNX with random weights, answering nearly the pose of `rest_angles (A,)`.
 
     Three linear encoders, two residual dense blocks, a linear decoder, normalisation before and after. Needs onnx.
     """
     import onnx
     from onnx import TensorProto, helper, numpy_helper
 
-    rng = np.random.default_rng(0)
+    layout, rng = layout_of(hand), np.random.default_rng(0)
     nodes, weights = [], []
 
     def constant(name: str, values: np.ndarray) -> str:
@@ -44,20 +45,21 @@ def full_graph(rest_angles: np.ndarray, width: int = WIDTH) -> bytes:
         y = node("Add", [dense(c, f"{name}.second", width, width, 0.3), c], f"{name}.y")
         return node("Add", [y, a], f"{name}.out")
 
-    centred = node("Sub", ["features", constant("input_mean", np.zeros(INPUT_SIZE))], "centred")
-    x = node("Mul", [centred, constant("input_gain", np.ones(INPUT_SIZE))], "x")
-    sizes = [columns.stop - columns.start for columns in ENCODED.values()]
+    centred = node("Sub", ["features", constant("input_mean", np.zeros(layout.input_size))], "centred")
+    x = node("Mul", [centred, constant("input_gain", np.ones(layout.input_size))], "x")
+    sizes = [columns.stop - columns.start for columns in layout.encoded.values()]
     weights.append(numpy_helper.from_array(np.array(sizes, np.int64), "sizes"))
-    nodes.append(helper.make_node("Split", [x, "sizes"], list(ENCODED), axis=1))
-    parts = [dense(name, f"{name}.code", size, width // 3) for name, size in zip(ENCODED, sizes, strict=True)]
-    decoded = dense(block(block(node("Concat", parts, "codes", axis=1), "one"), "two"), "decoded", width, OUTPUT_SIZE)
-    scaled = node("Mul", [decoded, constant("output_std", np.full(OUTPUT_SIZE, 1e-4))], "scaled")
-    node("Add", [scaled, constant("output_mean", _answer(rest_angles))], "outputs")
+    nodes.append(helper.make_node("Split", [x, "sizes"], list(layout.encoded), axis=1))
+    parts = [dense(name, f"{name}.code", size, width // 3) for name, size in zip(layout.encoded, sizes, strict=True)]
+    blocks = block(block(node("Concat", parts, "codes", axis=1), "one"), "two")
+    decoded = dense(blocks, "decoded", width, layout.output_size)
+    scaled = node("Mul", [decoded, constant("output_std", np.full(layout.output_size, 1e-4))], "scaled")
+    node("Add", [scaled, constant("output_mean", _answer(hand, rest_angles))], "outputs")
     graph = helper.make_graph(
         nodes,
         "manipnet",
-        [helper.make_tensor_value_info("features", TensorProto.FLOAT, ["hands", INPUT_SIZE])],
-        [helper.make_tensor_value_info("outputs", TensorProto.FLOAT, ["hands", OUTPUT_SIZE])],
+        [helper.make_tensor_value_info("features", TensorProto.FLOAT, ["hands", layout.input_size])],
+        [helper.make_tensor_value_info("outputs", TensorProto.FLOAT, ["hands", layout.output_size])],
         weights,
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=9)
@@ -65,14 +67,14 @@ def full_graph(rest_angles: np.ndarray, width: int = WIDTH) -> bytes:
     return model.SerializeToString()
 
 
-def _answer(angles: np.ndarray) -> np.ndarray:
-    """Outputs `(220,)` that say a pose, 2 cm from everything."""
-    positions, rotations = forward_kinematics(angles[None])
-    return pose_outputs(positions, rotations, np.full((1, 22), 0.02))[0]
+def _answer(hand: Hand, angles: np.ndarray) -> np.ndarray:
+    """Outputs `(output_size,)` that mean a pose 2 cm from everything."""
+    positions, rotations = forward_kinematics(hand, angles[None])
+    return pose_outputs(hand, positions, rotations, np.full((1, hand.joint_count), 0.02))[0]
 
 
-def forward_pass(content: bytes) -> Callable[[], object]:
+def forward_pass(content: bytes, layout: Layout) -> Callable[[], object]:
     """One run of a graph alone for two hands on one thread, on features that never change."""
-    session: onnxruntime.InferenceSession = open_session("reference", content)
-    rows = np.random.default_rng(1).normal(size=(HANDS, INPUT_SIZE)).astype(np.float32)
+    session: onnxruntime.InferenceSession = open_session("reference", content, layout)
+    rows = np.random.default_rng(1).normal(size=(HANDS, layout.input_size)).astype(np.float32)
     return lambda: session.run(None, {"features": rows})

@@ -92,8 +92,9 @@ def models(bench: Bench) -> Figures:
 
 def _asked_features(rig: Rig) -> np.ndarray:
     scenes, states = rig.synthesizer.asked
+    hand = rig.synthesizer.hand
     rows = [
-        features(scene.shape, windows_of([scene]), state.positions[None], state.rotations[None])
+        features(hand, scene.shape, windows_of([scene]), state.positions[None], state.rotations[None])
         for scene, state in zip(scenes, states, strict=True)
     ]
     return np.concatenate(rows)

@@ -13,12 +13,12 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from manipnet.common.options import parse_endpoint
 from manipnet.config.rig_reader import load_rig
+from manipnet.config.settings import all_options
 from manipnet.control.client import ControlClient
 from manipnet.inputs.zeromq import ZEROMQ
 from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net.curve_keys import read_client_keys
-from manipnet.net.zap import secure_client
-from manipnet.net.zmq_socket import MAX_WIRE_BYTES
+from manipnet.net.zmq_socket import connect
 from manipnet.recording.mcap_file import BODIES, HANDS, RecordingError, RecordingWriter, bodies_of, mesh_file
 from manipnet.runtime.signals import stop_on_signals
 from manipnet.synthesis.objects.mesh import load_mesh
@@ -28,7 +28,6 @@ from manipnet.wire.bodies import MessageError
 from manipnet_tools.commands.options import RecordOptions
 from manipnet_tools.terminal import open_console
 
-HANDS_PORT = 5555
 ANSWER_S = 3.0
 POLL_MS = 50
 
@@ -67,10 +66,11 @@ def record_hands(
     server: str, keys: Path | None, actor: str | None, writer: RecordingWriter, unfinished: Callable[[], bool]
 ) -> None:
     """Write every hands message of a server, and the bodies of one actor as body frames, while `unfinished()`."""
-    with zmq.Context() as context, context.socket(zmq.SUB) as socket:
-        socket.setsockopt(zmq.RCVHWM, 0)  # no message is dropped while the disk is slow
+    endpoint = parse_endpoint(server, all_options()["port"].default)
+    client_keys = None if keys is None else read_client_keys(keys)
+    # Without a high-water mark, no message is dropped while the disk is slow.
+    with zmq.Context() as context, connect(context, zmq.SUB, endpoint, client_keys, high_water_mark=0) as socket:
         socket.subscribe(TOPIC_MSGPACK)
-        _connect(socket, server, keys)
         while unfinished():
             if socket.poll(POLL_MS):
                 while socket.poll(0):
@@ -128,16 +128,6 @@ def read_rig(file: Path | None) -> tuple[dict[str, str], dict[str, bytes]]:
     meshes = {prop.name: load_mesh(prop.mesh, prop.unit, prop.scale) for prop in reversed(props)}
     files = {f"{name}.ply": mesh_file(mesh.vertices, mesh.faces) for name, mesh in meshes.items()}
     return {"rig": file.read_text(encoding="utf-8")}, files
-
-
-def _connect(socket: zmq.Socket, server: str, keys: Path | None) -> None:
-    host, port = parse_endpoint(server, HANDS_PORT)
-    socket.setsockopt(zmq.LINGER, 0)
-    socket.setsockopt(zmq.MAXMSGSIZE, MAX_WIRE_BYTES)
-    socket.setsockopt(zmq.IPV6, int(":" in host))
-    if keys is not None:
-        secure_client(socket, read_client_keys(keys))
-    socket.connect(f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}")
 
 
 def _decode(raw: bytes) -> HandsMessage:

@@ -160,7 +160,7 @@ def _server_options() -> list[Option]:
 def _other_interfaces(config: ServerConfig, receivers: Mapping[Input, Any]) -> other_interfaces.OtherInterfaces:
     everywhere = config.host in ("0.0.0.0", "::")
     addresses = set() if everywhere else other_interfaces.own_addresses() - {config.host}
-    ports = [
+    ports: list[other_interfaces.Port] = [
         (declared.transport, getattr(config.of(declared.options), declared.where.field))
         for declared in receivers
         if declared.transport is not None

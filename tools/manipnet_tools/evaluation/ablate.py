@@ -108,7 +108,7 @@ def train_rows(tracks: Sequence[HandTrack], options: AblateOptions, fold: str, s
         for row, config in configs.items():
             if not turn:
                 torch.manual_seed(config.seed)
-                learners[row] = Learner(samples, config)
+                learners[row] = Learner(lessons.hand, samples, config)
             loss = learners[row].learn(samples)
             _log.info("%s  %s  round %d/%d  loss %.4f", fold, row, turn + 1, config.rounds, loss)
     for row, learner in learners.items():

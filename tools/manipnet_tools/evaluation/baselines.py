@@ -4,16 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.features import features
-from manipnet.synthesis.model.layout import ENCODED, INPUT
-from manipnet.synthesis.synthesizer import HandState, Side, windows_of
+from manipnet.synthesis.model.layout import Layout, layout_of
+from manipnet.synthesis.synthesizer import HandState, windows_of
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.takes.rollout import HandInput
 
 RETRIEVE_EVERY = 3
 """Training frames kept for retrieval: at 20 Hz neighbours are all but equal."""
-_BLOCKS = (ENCODED["trajectory"], INPUT["signed_distances"].columns, INPUT["surface_normals"].columns)
 
 
 def mean_pose(train: Sequence[Case]) -> Array:
@@ -32,8 +32,8 @@ class Retrieval:
     The surroundings are distances and directions from the joints of a hand that stays in the pose `hand`.
     """
 
-    def __init__(self, train: Sequence[Case], hand: HandState) -> None:
-        self._hand = hand
+    def __init__(self, train: Sequence[Case], hand: Hand, state: HandState) -> None:
+        self._hand, self._state, self._blocks = hand, state, _blocks(layout_of(hand))
         rows, fingers = [], []
         for case in train:
             for side, seen in case.inputs.items():
@@ -41,7 +41,7 @@ class Retrieval:
                 fingers.append(case.captured[side][::RETRIEVE_EVERY])
         keys, self._fingers = np.concatenate(rows), np.concatenate(fingers)
         self._weights = np.concatenate(
-            [np.full(b.stop - b.start, 1.0 / np.sqrt(b.stop - b.start)) for b in _BLOCKS]
+            [np.full(b.stop - b.start, 1.0 / np.sqrt(b.stop - b.start)) for b in self._blocks]
         ) / np.maximum(keys.std(axis=0), 1e-3)
         self._keys = keys * self._weights
         self._squares = (self._keys**2).sum(axis=1)
@@ -60,7 +60,16 @@ class Retrieval:
         windows = windows_of([seen.scene(tick) for tick in range(len(seen))[ticks]])
         count = len(windows.wrist)
         positions, rotations = (
-            np.repeat(pose[None], count, axis=0) for pose in (self._hand.positions, self._hand.rotations)
+            np.repeat(pose[None], count, axis=0) for pose in (self._state.positions, self._state.rotations)
         )
-        rows = features(seen.shapes[0], windows, positions, rotations)
-        return np.concatenate([rows[:, block] for block in _BLOCKS], axis=1)
+        rows = features(self._hand, seen.shapes[0], windows, positions, rotations)
+        return np.concatenate([rows[:, block] for block in self._blocks], axis=1)
+
+
+def _blocks(layout: Layout) -> tuple[slice, ...]:
+    """The columns that frames are compared by."""
+    return (
+        layout.encoded["trajectory"],
+        layout.input["signed_distances"].columns,
+        layout.input["surface_normals"].columns,
+    )

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from manipnet import geometry
-from manipnet.geometry import Array
-from manipnet.synthesis.hand.skeleton import JOINT_COUNT
+from manipnet.geometry import SIDES, Array, Side
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import Shape, load_shape
-from manipnet.synthesis.synthesizer import Side
 from manipnet_tools.evaluation import metrics, physics
 from manipnet_tools.evaluation.metrics import Gaps, Mask
-from manipnet_tools.takes.rollout import SIDES, HandInput, Ticks, hand_inputs, tick_take
+from manipnet_tools.takes.rollout import HandInput, Ticks, hand_inputs, tick_take
 from manipnet_tools.takes.take import Take, read_take
 
 SEEN_SHARE = 0.8
@@ -33,6 +33,8 @@ class Case:
     """
 
     name: str
+    hand: Hand
+    """The hand that was captured, whose capsules touch."""
     object: str
     shape: Shape
     ticks: Ticks
@@ -72,7 +74,7 @@ class Case:
 
     def gaps_of(self, side: Side, positions: Array) -> Gaps:
         """Gaps of a hand with joints `(T, 22, 3)` in the canonical wrist frame, worn on this take's wrist."""
-        return metrics.capsule_gaps(self._in_world(side, positions), self.T_world_object, self.shape)
+        return metrics.capsule_gaps(self.hand, self._in_world(side, positions), self.T_world_object, self.shape)
 
     def on_object(self, side: Side, positions: Array) -> Array:
         """The joints of such a hand in the object's frame, `(T, 22, 3)`."""
@@ -107,17 +109,18 @@ def load_case(take: Take, meshes: Path) -> Case:
     path = meshes / f"{take.objects[0]}.obj"
     if not path.is_file():
         raise DataError(f"{take.name}: no mesh {path}")
-    shape, ticks = load_shape(path), tick_take(take)
+    subject, shape, ticks = shipped_hand(), load_shape(path), tick_take(take)
     body, T_world_object = physics.body_of(shape), ticks.bodies[take.objects[0]].poses
     world: dict[Side, Array] = {side: captured_at(take, side, ticks.time_s) for side in SIDES}
     return Case(
         take.name,
+        subject,
         take.objects[0],
         shape,
         ticks,
         hand_inputs(ticks, {take.objects[0]: shape}),
         {side: _in_wrist(side, p, ticks.bodies[f"{side}_wrist"].poses) for side, p in world.items()},
-        {side: metrics.capsule_gaps(p, T_world_object, shape) for side, p in world.items()},
+        {side: metrics.capsule_gaps(subject, p, T_world_object, shape) for side, p in world.items()},
         physics.wrench_needed(T_world_object, body),
         physics.wrench_needed(T_world_object, body, physics.PAPER),
         physics.lifted(T_world_object, body),
@@ -127,9 +130,10 @@ def load_case(take: Take, meshes: Path) -> Case:
 
 def captured_at(take: Take, side: Side, time_s: Array) -> Array:
     """Captured joints in the world `(T, 22, 3)` at times from the take's first frame, interpolated."""
-    flat = take.fingers[side].positions.reshape(len(take.time_s), -1)
+    positions = take.fingers[side].positions
+    flat = positions.reshape(len(take.time_s), -1)
     at = take.time_s - take.time_s[0]
-    return np.stack([np.interp(time_s, at, column) for column in flat.T], axis=1).reshape(-1, JOINT_COUNT, 3)
+    return np.stack([np.interp(time_s, at, column) for column in flat.T], axis=1).reshape(-1, *positions.shape[1:])
 
 
 def _in_wrist(side: Side, p_world: Array, T_world_wrist: Array) -> Array:

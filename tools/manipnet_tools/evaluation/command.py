@@ -11,7 +11,6 @@ from rich.table import Table
 
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
-from manipnet.synthesis.synthesizer import SolverName
 from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import data_folders, load_cases
 from manipnet_tools.evaluation.results import (
@@ -38,7 +37,7 @@ class EvaluateOptions:
     are missing are trained, which takes long, and kept there."""
     protocol: Protocol = "seen"
     """seen: the last 20 % of every take. unseen: every take with a model that has not seen its object."""
-    solver: tuple[SolverName, ...] = ("least_squares", "none")
+    solver: tuple[str, ...] = ("least_squares", "none")
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""

@@ -1,7 +1,7 @@
 """How good a roll-out is: pure functions over arrays at 60 Hz.
 
 The measures follow the paper (section 8) where it defines them; near frames, the joint error ratio, contact
-F1 and the idle hand are this project's. Positions are metres, joints in the order of `hand.skeleton`; "wrist
+F1 and the idle hand are this project's. Positions are metres, joints in the order of the hand; "wrist
 frame" means the canonical right hand's, so a left hand is mirrored before it comes here. A *gap* is the
 distance from a capsule's surface to the object's surface, negative inside.
 """
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from manipnet import geometry
 from manipnet.geometry import Array
-from manipnet.synthesis.hand import skeleton
+from manipnet.synthesis.hand.hand import Hand
 
 Mask = NDArray[np.bool_]
 
@@ -28,10 +28,6 @@ TOUCH_M = 0.004
 AXIS_SAMPLES = 7
 PALM_START = 0.3
 """Palm capsules are sampled from 30 % of the way from wrist to knuckle: the rest is forearm side."""
-
-_START, _END = skeleton.CAPSULE_JOINTS.T
-_TIP_CAPSULES = np.flatnonzero(_END >= skeleton.BONE_COUNT)
-_FRACTIONS = np.linspace(np.where(_START == 0, PALM_START, 0.0), 1.0, AXIS_SAMPLES, axis=1)
 
 
 class Surface(Protocol):
@@ -62,18 +58,20 @@ class Gaps:
         return self.gap.min(axis=1)
 
 
-def capsule_axes(positions: Array) -> Array:
-    """Seven points along the axis of each of the 19 capsules: joints `(..., 22, 3)` to `(..., 19, 7, 3)`."""
-    start, end = positions[..., _START, None, :], positions[..., _END, None, :]
-    return start + _FRACTIONS[:, :, None] * (end - start)
+def capsule_axes(hand: Hand, positions: Array) -> Array:
+    """Seven points along the axis of each capsule: joints `(..., J, 3)` to `(..., C, 7, 3)`."""
+    first, last = hand.capsules.T
+    fractions = np.linspace(np.where(first == 0, PALM_START, 0.0), 1.0, AXIS_SAMPLES, axis=1)
+    start, end = positions[..., first, None, :], positions[..., last, None, :]
+    return start + fractions[:, :, None] * (end - start)
 
 
-def capsule_gaps(p_world: Array, T_world_object: Array, surface: Surface) -> Gaps:
+def capsule_gaps(hand: Hand, p_world: Array, T_world_object: Array, surface: Surface) -> Gaps:
     """Gaps between the capsules of a hand and an object.
 
-    `p_world (T, 22, 3)` are joint positions, `T_world_object (T, 7)` the pose of the mesh frame.
+    `p_world (T, J, 3)` are joint positions, `T_world_object (T, 7)` the pose of the mesh frame.
     """
-    p_object = geometry.transform(geometry.invert(T_world_object)[:, None, None], capsule_axes(p_world))
+    p_object = geometry.transform(geometry.invert(T_world_object)[:, None, None], capsule_axes(hand, p_world))
     distance, normal, point = surface.signed_distance(p_object.reshape(-1, 3))
     distance = distance.reshape(p_object.shape[:3])
     nearest = distance.argmin(axis=2)[..., None]
@@ -81,7 +79,7 @@ def capsule_gaps(p_world: Array, T_world_object: Array, surface: Surface) -> Gap
     def pick(values: Array) -> Array:
         return np.take_along_axis(values.reshape(p_object.shape), nearest[..., None], axis=2)[:, :, 0]
 
-    gap = np.take_along_axis(distance, nearest, axis=2)[..., 0] - skeleton.CAPSULE_RADII_M
+    gap = np.take_along_axis(distance, nearest, axis=2)[..., 0] - hand.radii
     return Gaps(gap, pick(point), pick(normal))
 
 
@@ -105,9 +103,9 @@ def joint_error_m(positions: Array, captured: Array) -> Array:
     return np.linalg.norm(positions - captured, axis=-1)[:, 1:].mean(axis=1)
 
 
-def fingertip_error_m(positions: Array, captured: Array) -> Array:
+def fingertip_error_m(hand: Hand, positions: Array, captured: Array) -> Array:
     """Mean distance of the five fingertips, wrist frame: `(T, 22, 3)` twice to `(T,)`."""
-    return np.linalg.norm(positions - captured, axis=-1)[:, skeleton.BONE_COUNT :].mean(axis=1)
+    return np.linalg.norm(positions - captured, axis=-1)[:, hand.bone_count :].mean(axis=1)
 
 
 def penetration_cm(gaps: Gaps) -> float:
@@ -132,13 +130,14 @@ def contact_f1(gaps: Gaps, captured: Gaps) -> float:
     return float(2.0 * (ours & theirs).sum() / total) if total else float("nan")
 
 
-def slide_mm_s(p_object: Array, gaps: Gaps) -> float:
+def slide_mm_s(hand: Hand, p_object: Array, gaps: Gaps) -> float:
     """Mean speed over the object's surface of fingertips whose capsules touch it (4 mm) in two frames on end.
 
     `p_object (T, 22, 3)` are joint positions in the object's frame; nan where none touches.
     """
-    touching = gaps.gap[:, _TIP_CAPSULES] < TOUCH_M
-    speed = np.linalg.norm(np.diff(p_object[:, skeleton.BONE_COUNT :], axis=0), axis=-1) * RATE_HZ
+    tips = np.flatnonzero(hand.capsules[:, 1] >= hand.bone_count)
+    touching = gaps.gap[:, tips] < TOUCH_M
+    speed = np.linalg.norm(np.diff(p_object[:, hand.capsules[tips, 1]], axis=0), axis=-1) * RATE_HZ
     held = speed[touching[1:] & touching[:-1]]
     return 1000.0 * float(held.mean()) if len(held) else float("nan")
 

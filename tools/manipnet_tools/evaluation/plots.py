@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from manipnet import geometry
-from manipnet.geometry import Array
-from manipnet.synthesis.hand.skeleton import CAPSULE_JOINTS, CAPSULE_RADII_M, JOINT_NAMES
-from manipnet.synthesis.synthesizer import Side
+from manipnet.geometry import Array, Side
+from manipnet.synthesis.hand.hand import Hand
 from manipnet_tools.evaluation import metrics
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.rendering import (
@@ -33,10 +32,6 @@ if TYPE_CHECKING:
     from manipnet_tools.evaluation.scoring import Score
 
 PRESSED = (0.78, 0.16, 0.12)
-CAPSULE_NAMES = [
-    f"{'PALM to ' if start == 0 else ''}{JOINT_NAMES[end if start == 0 else start]}".lower().replace("_", " ")
-    for start, end in CAPSULE_JOINTS
-]
 PICTURE = (420, 420)
 
 
@@ -108,6 +103,7 @@ def _error_over_time(case: Case, rows: dict[str, dict[Side, Array]]) -> "Figure"
 def _contact_strips(case: Case, hands: dict[Side, Array]) -> "Figure":
     """Per capsule and frame: grey where both touch, orange where only the captured, blue where only ours."""
     figure, panels = _figure(case, 8.0)
+    names = _capsule_names(case.hand)
     colors = np.array([(1, 1, 1), (0.95, 0.6, 0.1), (0.15, 0.45, 0.85), (0.55, 0.55, 0.55)])
     for side, axes in panels:
         captured = case.gaps[side].gap < metrics.CONTACT_M
@@ -117,11 +113,18 @@ def _contact_strips(case: Case, hands: dict[Side, Array]) -> "Figure":
             colors[captured.T + 2 * ours.T],
             aspect="auto",
             interpolation="nearest",
-            extent=(time[0], time[-1], len(CAPSULE_NAMES) - 0.5, -0.5),
+            extent=(time[0], time[-1], len(names) - 0.5, -0.5),
         )
-        axes.set_yticks(range(len(CAPSULE_NAMES)), CAPSULE_NAMES, fontsize=7)
+        axes.set_yticks(range(len(names)), names, fontsize=7)
         axes.set_title(f"{case.name}, {side} hand: grey both touch, orange only captured, blue only synthesised")
     return figure
+
+
+def _capsule_names(hand: Hand) -> list[str]:
+    names = [
+        f"PALM to {hand.joint_names[end]}" if start == 0 else hand.joint_names[start] for start, end in hand.capsules
+    ]
+    return [name.lower().replace("_", " ") for name in names]
 
 
 def _worst_frames(results: "Results", ours: str) -> Image:
@@ -148,8 +151,8 @@ def _picture(case: Case, side: Side, positions: Array, frame: int) -> Image:
         vertices, faces = geometry.mirror_points(vertices), faces[:, ::-1]
     touches = case[frame : frame + 1].gaps_of(side, positions[None]).gap[0] < metrics.CONTACT_M
     solids = [Solid(vertices, faces, CERAMIC)]
-    for capsule, (start, end) in enumerate(CAPSULE_JOINTS):
-        radius, color = CAPSULE_RADII_M[capsule], PRESSED if touches[capsule] else SKIN_RIGHT
+    for capsule, (start, end) in enumerate(case.hand.capsules):
+        radius, color = float(case.hand.radii[capsule]), PRESSED if touches[capsule] else SKIN_RIGHT
         ends = positions[[start, end]]
         solids += [rods(ends[:1], ends[1:], radius, color), beads(ends, radius, color)]
     view = Camera.orbit(np.array([0.1, 0.0, -0.03]), 0.5, azimuth=np.radians(160), elevation=np.radians(25))

@@ -9,8 +9,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from manipnet.geometry import SIDES
 from manipnet_tools.evaluation.scoring import TARGETS, Score
-from manipnet_tools.takes.rollout import SIDES
 
 if TYPE_CHECKING:
     from manipnet_tools.evaluation.results import Results

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from manipnet.geometry import Array
-from manipnet.synthesis.synthesizer import Side, SolverName
+from manipnet.geometry import Array, Side
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.evaluation.scoring import Score, average
 
@@ -49,6 +48,6 @@ class Results:
     rows: dict[str, Row]
 
 
-def row_name(model: str, solver: SolverName) -> str:
+def row_name(model: str, solver: str) -> str:
     """What the row of a model with a solver is called."""
     return f"{model}, no IK" if solver == "none" else f"{model}, {solver.replace('_', ' ')}"

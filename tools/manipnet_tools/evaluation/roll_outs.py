@@ -6,7 +6,7 @@ from rich.progress import Progress
 
 from manipnet.geometry import Array
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.synthesizer import SolverName, Synthesizer
+from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case
 from manipnet_tools.evaluation.results import (
@@ -38,7 +38,7 @@ def evaluate(
     folds: Sequence[Fold],
     protocol: Protocol,
     models: dict[str, Callable[[Fold], Bundle]],
-    solvers: Sequence[SolverName],
+    solvers: Sequence[str],
     progress: Progress,
 ) -> Results:
     """Test every model, with every solver, and the baselines on every fold.
@@ -63,12 +63,13 @@ def _all_hands(
     fold: Fold,
     mean: Array,
     models: dict[str, Callable[[Fold], Bundle]],
-    solvers: Sequence[SolverName],
+    solvers: Sequence[str],
     advance: Callable[[int], None],
 ) -> Iterator[tuple[str, Case, Hands]]:
     bundles = {name: model(fold) for name, model in models.items()}
-    rest = Synthesizer(next(iter(bundles.values()))).rest_state()
-    retrieve = baselines.Retrieval(fold.train, rest)
+    first = next(iter(bundles.values()))
+    rest = Synthesizer(first).rest_state()
+    retrieve = baselines.Retrieval(fold.train, first.hand, rest)
     for case in fold.test:
         yield CAPTURED, case, case.captured
         yield MEAN, case, baselines.held(case, mean)
@@ -81,7 +82,7 @@ def _all_hands(
 
 
 def synthesise(
-    bundle: Bundle, solver: SolverName, cases: Sequence[Case], advance: Callable[[int], None] = lambda n: None
+    bundle: Bundle, solver: str, cases: Sequence[Case], advance: Callable[[int], None] = lambda n: None
 ) -> list[Hands]:
     """Roll out both hands of all cases from the neutral pose: joints in the canonical wrist frame."""
     inputs = [case.inputs for case in cases]

@@ -5,8 +5,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from manipnet.geometry import Array
-from manipnet.synthesis.synthesizer import Side
+from manipnet.geometry import Array, Side
 from manipnet_tools.evaluation import metrics, physics
 from manipnet_tools.evaluation.cases import Case
 
@@ -71,13 +70,13 @@ def _of_hand(
         "ratio": _mean(error[near]) / _mean(reference[near]),
         "near_mm": 1e3 * _mean(error[near]),
         "mpjpe_mm": 1e3 * _mean(error[counts]),
-        "tip_mm": 1e3 * _mean(metrics.fingertip_error_m(positions, captured)[counts]),
+        "tip_mm": 1e3 * _mean(metrics.fingertip_error_m(case.hand, positions, captured)[counts]),
         "drift_s": metrics.longest_drift_s(error[counts]),
         "contact_f1": metrics.contact_f1(gaps[counts], captured_gaps[counts]),
         "penetration_cm": metrics.penetration_cm(gaps[counts]),
         "over_1cm": metrics.deeper_share(gaps[counts]),
         "deep": metrics.deep_frames(gaps[counts]),
-        "slide_mm_s": metrics.slide_mm_s(case.on_object(side, positions)[counts], gaps[counts]),
+        "slide_mm_s": metrics.slide_mm_s(case.hand, case.on_object(side, positions)[counts], gaps[counts]),
         "smoothness": smoothness,
         "smoothness_ratio": smoothness / metrics.smoothness_cm_s2(captured, counts),
         "idle_ratio": metrics.smoothness_cm_s2(positions, idle) / metrics.smoothness_cm_s2(captured, idle),

@@ -12,11 +12,11 @@ import numpy as np
 import trimesh
 
 from manipnet import geometry
-from manipnet.geometry import Array
+from manipnet.geometry import Array, Side
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
-from manipnet.synthesis.synthesizer import Side, SolverName, Synthesizer
+from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines, metrics, physics
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case, data_folders, load_case
 from manipnet_tools.evaluation.roll_outs import synthesise
@@ -52,7 +52,7 @@ def hand_ticks(name: str, subjects: list[Subject]) -> int:
 
 
 def sweep(
-    name: str, subjects: list[Subject], bundle: Bundle, solver: SolverName, advance: Callable[[int], None]
+    name: str, subjects: list[Subject], bundle: Bundle, solver: str, advance: Callable[[int], None]
 ) -> Iterator[tuple[str, Score]]:
     """Each step of a sweep with the average score over the takes and hands; `loop` only takes the first take."""
     mean = baselines.mean_pose([subject.case.part(0.0, SEEN_SHARE) for subject in subjects])
@@ -153,7 +153,7 @@ CHANGES: dict[str, dict[str, Change]] = {
 
 
 def _loop(
-    case: Case, mean: Array, bundle: Bundle, solver: SolverName, advance: Callable[[int], None]
+    case: Case, mean: Array, bundle: Bundle, solver: str, advance: Callable[[int], None]
 ) -> Iterator[tuple[str, Score]]:
     """Ten minutes of one case played to and fro without a restart, scored pass by pass."""
     there_and_back = 2 * len(case)

@@ -8,11 +8,10 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from manipnet.geometry import Array, mirror_points, quat_conjugate, quat_multiply, quat_rotate
+from manipnet.geometry import Array, Side, mirror_points, quat_conjugate, quat_multiply, quat_rotate
 from manipnet.recording.mcap_file import read_hands
-from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_COUNT, OFFSETS_M, PARENTS
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
-from manipnet.synthesis.synthesizer import Side
 from manipnet.wire import SIDES, HandsMessage
 from manipnet_tools.takes.meshes import recorded_meshes
 from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
@@ -20,7 +19,6 @@ from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
 TICK_HZ = 60.0
 PAUSE_S = 10.0
 """A recording whose sender's time jumps back, or on by more than this, goes on with another animation."""
-_BONE_PARENTS = PARENTS[1:BONE_COUNT]
 
 
 class ExportError(ValueError):
@@ -31,6 +29,8 @@ class ExportError(ValueError):
 class HandTrack:
     """One hand of `T` frames; a left one as it is, not mirrored."""
 
+    model: Hand
+    """The hand whose bones it has, apart from their lengths."""
     wrist: Array
     """`(T, 7)` in the world."""
     rotations: Array
@@ -43,15 +43,15 @@ class HandTrack:
     @property
     def scale(self) -> float:
         """Size over the model's hand."""
-        return float(np.linalg.norm(self.offsets) / np.linalg.norm(OFFSETS_M))
+        return float(np.linalg.norm(self.offsets) / np.linalg.norm(self.model.offsets))
 
     def world(self) -> tuple[Array, Array]:
         """Joints `(T, 22, 3)` and bone rotations `(T, 17, 4)` in the world."""
-        positions, rotations = np.empty((len(self.wrist), JOINT_COUNT, 3)), self.rotations.copy()
+        positions, rotations = np.empty((len(self.wrist), self.model.joint_count, 3)), self.rotations.copy()
         positions[:, 0] = self.wrist[:, :3]
-        for joint, parent in enumerate(PARENTS[1:], start=1):
+        for joint, parent in enumerate(self.model.parents[1:], start=1):
             positions[:, joint] = positions[:, parent] + quat_rotate(rotations[:, parent], self.offsets[joint])
-            if joint < BONE_COUNT:
+            if joint < self.model.bone_count:
                 rotations[:, joint] = quat_multiply(rotations[:, parent], self.rotations[:, joint])
         return positions, rotations
 
@@ -69,35 +69,36 @@ class Animation:
     """Of those objects whose shape is known."""
 
 
-def read_animation(path: Path, actor: str | None = None) -> Animation:
-    """Fingers from a recording (of one `actor`, the first by default), the file of `manipnet synthesize`, or a take.
+def read_animation(path: Path, model: Hand, actor: str | None = None) -> Animation:
+    """Fingers of the hand `model` from a recording (of one `actor`, the first by default), the file of
+    `manipnet synthesize`, or a take.
 
     Raises `ExportError`, `TakeError`, `RecordingError` and `MeshError`.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        return _read_synthesised(path)
+        return _read_synthesised(path, model)
     if suffix == ".mcap" and path.is_file():
-        return _read_recording(path, actor)
+        return _read_recording(path, model, actor)
     take = read_take(path)
     if not take.fingers:
         raise _no_fingers(path, take.objects)
     hands: dict[Side, HandTrack] = {
-        side: hand_track(take.fingers[side].positions, take.fingers[side].rotations) for side in SIDES
+        side: hand_track(model, take.fingers[side].positions, take.fingers[side].rotations) for side in SIDES
     }
     return Animation(take.name, take.rate_hz, take.time_s, hands, {name: take.bodies[name] for name in take.objects})
 
 
-def hand_track(positions: Array, rotations: Array) -> HandTrack:
+def hand_track(model: Hand, positions: Array, rotations: Array) -> HandTrack:
     """A track from joints `(T, 22, 3)` and bone rotations `(T, 17, 4)` in the world."""
     local = rotations.copy()
-    local[:, 1:] = quat_multiply(quat_conjugate(rotations[:, _BONE_PARENTS]), rotations[:, 1:])
-    offsets = np.zeros((JOINT_COUNT, 3))
-    parents = PARENTS[1:]
+    local[:, 1:] = quat_multiply(quat_conjugate(rotations[:, model.parents[1 : model.bone_count]]), rotations[:, 1:])
+    offsets = np.zeros((model.joint_count, 3))
+    parents = model.parents[1:]
     along = positions[:, 1:] - positions[:, parents]
     offsets[1:] = np.median(quat_rotate(quat_conjugate(rotations[:, parents]), along), axis=0)
     wrist = np.concatenate([positions[:, 0], rotations[:, 0]], axis=1)
-    return HandTrack(wrist, local, offsets, np.ones(len(wrist), dtype=np.bool_))
+    return HandTrack(model, wrist, local, offsets, np.ones(len(wrist), dtype=np.bool_))
 
 
 def _no_fingers(path: Path, objects: Iterable[str]) -> ExportError:
@@ -108,13 +109,13 @@ def _no_fingers(path: Path, objects: Iterable[str]) -> ExportError:
     )
 
 
-def _read_synthesised(path: Path) -> Animation:
+def _read_synthesised(path: Path, model: Hand) -> Animation:
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = dict(file)
         time_s = arrays["time"]
         hands: dict[Side, HandTrack] = {
-            side: hand_track(arrays[f"{side}_positions"], arrays[f"{side}_rotations"]) for side in SIDES
+            side: hand_track(model, arrays[f"{side}_positions"], arrays[f"{side}_rotations"]) for side in SIDES
         }
     except OSError as error:
         raise ExportError(f"{path}: cannot be read ({error.strerror or error})") from None
@@ -129,7 +130,7 @@ def _read_synthesised(path: Path) -> Animation:
     return Animation(path.stem, TICK_HZ, time_s, hands, objects, meshes)
 
 
-def _read_recording(path: Path, actor: str | None) -> Animation:
+def _read_recording(path: Path, model: Hand, actor: str | None) -> Animation:
     messages = list(read_hands(path))
     actors = dict.fromkeys(message.actor for message in messages)
     if not messages:
@@ -141,7 +142,7 @@ def _read_recording(path: Path, actor: str | None) -> Animation:
     rows = {tick: message for tick, message in zip(ticks.tolist(), run, strict=True)}
     frames = [rows.get(tick) for tick in range(ticks[-1] + 1)]
     hands: dict[Side, HandTrack] = {
-        side: track for side in SIDES if (track := _recorded_hand(frames, side)) is not None
+        side: track for side in SIDES if (track := _recorded_hand(model, frames, side)) is not None
     }
     if not hands:
         raise ExportError(f"{path}: its hands messages hold no hand; was a wrist tracked?")
@@ -161,7 +162,7 @@ def _longest_run(messages: list[HandsMessage]) -> list[HandsMessage]:
     return max(runs, key=len)
 
 
-def _recorded_hand(frames: list[HandsMessage | None], side: Side) -> HandTrack | None:
+def _recorded_hand(model: Hand, frames: list[HandsMessage | None], side: Side) -> HandTrack | None:
     poses = [None if message is None else message.hands.get(side) for message in frames]
     there = np.array([pose is not None for pose in poses])
     if not there.any():
@@ -172,9 +173,9 @@ def _recorded_hand(frames: list[HandsMessage | None], side: Side) -> HandTrack |
     wrist = np.stack([hand.wrist for hand in hands])
     rotations[:, 0] = wrist[:, 3:]
     scale = float(np.median([hand.scale for hand in hands]))
-    offsets = scale * (OFFSETS_M if side == "right" else mirror_points(OFFSETS_M))
+    offsets = scale * (model.offsets if side == "right" else mirror_points(model.offsets))
     live = there & np.array([hand.state == "live" for hand in hands])
-    return HandTrack(wrist, rotations, offsets, live)
+    return HandTrack(model, wrist, rotations, offsets, live)
 
 
 def _recorded_body(frames: list[HandsMessage | None], name: str) -> BodyTrack:

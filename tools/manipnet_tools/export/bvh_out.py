@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import Array, mirror_points, mirror_quats
-from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_NAMES, PARENTS
+from manipnet.synthesis.hand.hand import Hand
 from manipnet_tools.export.animation import Animation, ExportError, HandTrack
 
 DECIMETRES_PER_M = 10.0
@@ -60,18 +60,24 @@ class _Space:
 def _hand_text(hand: HandTrack, rate_hz: float, space: _Space) -> str:
     offsets = space.points(hand.offsets)
     columns = [space.points(hand.wrist[:, :3]), space.degrees(hand.rotations).reshape(len(hand.wrist), -1)]
-    return "\n".join(["HIERARCHY", *_joint(0, offsets, ""), *_motion(np.concatenate(columns, axis=1), rate_hz)])
+    return "\n".join(
+        ["HIERARCHY", *_joint(hand.model, 0, offsets, ""), *_motion(np.concatenate(columns, axis=1), rate_hz)]
+    )
 
 
-def _joint(joint: int, offsets: Array, indent: str) -> list[str]:
+def _joint(model: Hand, joint: int, offsets: Array, indent: str) -> list[str]:
     """Lines of a joint and all below it; the dataset's joints are in depth-first order, as ours are."""
-    if joint >= BONE_COUNT:
+    if joint >= model.bone_count:
         head, channels = f"{indent}End Site", []
     elif joint == 0:
-        head, channels = f"ROOT {JOINT_NAMES[0]}", [f"\t{_ROOT_CHANNELS}"]
+        head, channels = f"ROOT {model.joint_names[0]}", [f"\t{_ROOT_CHANNELS}"]
     else:
-        head, channels = f"{indent}JOINT {JOINT_NAMES[joint]}", [f"{indent}\tCHANNELS 3 {_CHANNELS}"]
-    below = [line for child in np.flatnonzero(joint == PARENTS) for line in _joint(int(child), offsets, f"{indent}\t")]
+        head, channels = f"{indent}JOINT {model.joint_names[joint]}", [f"{indent}\tCHANNELS 3 {_CHANNELS}"]
+    below = [
+        line
+        for child in np.flatnonzero(joint == model.parents)
+        for line in _joint(model, int(child), offsets, f"{indent}\t")
+    ]
     return [head, f"{indent}{{", f"{indent}\tOFFSET {_numbers(offsets[joint])}", *channels, *below, f"{indent}}}"]
 
 

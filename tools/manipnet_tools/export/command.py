@@ -1,5 +1,6 @@
 """`manipnet export`: writes hands and objects for other programs."""
 
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet_tools.commands.options import ExportOptions
 from manipnet_tools.export.animation import Animation, ExportError, read_animation, with_meshes
@@ -20,7 +21,7 @@ def run(options: ExportOptions) -> None:
     check(options)
     console = open_console()
     with console.status(f"reading {options.source}"):
-        animation = read_animation(options.source, options.actor)
+        animation = read_animation(options.source, shipped_hand(), options.actor)
         files = named_files(options.mesh, animation.objects)
         animation = with_meshes(animation, {name: load_mesh(file, name=name) for name, file in files.items()})
     with console.status(f"writing {options.out}"):

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from manipnet.geometry import Array, mirror_quats, quat_conjugate, quat_multiply, quat_to_matrix
+from manipnet.geometry import Array, Side, mirror_quats, quat_conjugate, quat_multiply, quat_to_matrix
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import angles_from_rotations
-from manipnet.synthesis.hand.skeleton import DOF_NAMES, JOINT_NAMES
-from manipnet.synthesis.synthesizer import Side
 from manipnet_tools.export.animation import Animation, HandTrack
 
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
@@ -33,14 +32,14 @@ def _hand_columns(side: Side, hand: HandTrack) -> dict[str, Array]:
     positions, rotations = hand.world()
     columns = {f"{side}_live": hand.live.astype(np.float64)}
     columns |= {f"{side}_wrist_{part}": hand.wrist[:, 3 + k] for k, part in enumerate(_POSE[3:])}
-    angles = hand_angles(side, rotations)
-    columns |= {f"{side}_{name.lower()}_rad": angles[:, k] for k, name in enumerate(DOF_NAMES)}
-    for joint, name in enumerate(JOINT_NAMES):
+    angles = hand_angles(hand.model, side, rotations)
+    columns |= {f"{side}_{name.lower()}_rad": angles[:, k] for k, name in enumerate(hand.model.angle_names)}
+    for joint, name in enumerate(hand.model.joint_names):
         columns |= {f"{side}_{name.lower()}_{axis}": positions[:, joint, k] for k, axis in enumerate("xyz")}
     return columns
 
 
-def hand_angles(side: Side, rotations: Array) -> Array:
-    """The 20 angles `(T, 20)` nearest to bone rotations `(T, 17, 4)` in the world."""
+def hand_angles(model: Hand, side: Side, rotations: Array) -> Array:
+    """The angles `(T, A)` nearest to bone rotations `(T, 17, 4)` in the world."""
     quats = quat_multiply(quat_conjugate(rotations[:, :1]), rotations)
-    return angles_from_rotations(quat_to_matrix(mirror_quats(quats) if side == "left" else quats))
+    return angles_from_rotations(model, quat_to_matrix(mirror_quats(quats) if side == "left" else quats))

@@ -1,7 +1,6 @@
 """Hands and objects as glTF 2.0: both hands as skinned meshes with their skeletons, objects, and one animation.
 
-Right-handed, Y up, metres, as glTF wants it. Time starts at the first frame. The skin is
-`manipnet.synthesis.hand.surface`.
+Right-handed, Y up, metres, as glTF wants it. Time starts at the first frame. The skin is the model hand's own.
 """
 
 from collections.abc import Mapping
@@ -13,10 +12,8 @@ from numpy.typing import NDArray
 
 from manipnet import __version__
 from manipnet.geometry import MIRROR, Array, mirror_points
-from manipnet.synthesis.hand.bind_pose import BIND_ANGLES_RAD
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_COUNT, JOINT_NAMES, PARENTS
-from manipnet.synthesis.hand.surface import BONES, FACES, VERTICES, WEIGHTS
 from manipnet.synthesis.objects.mesh import ClosedMesh
 from manipnet.wire import Side
 from manipnet_tools.export.animation import Animation, HandTrack
@@ -52,16 +49,16 @@ class _Scene:
 
     def add_hand(self, side: Side, hand: HandTrack) -> None:
         """A skeleton of 22 joints, tips included, and the skin that follows it."""
-        first = len(self._document["nodes"])
-        for joint, name in enumerate(JOINT_NAMES):
-            children = [first + int(child) for child in np.flatnonzero(joint == PARENTS)]
+        first, model = len(self._document["nodes"]), hand.model
+        for joint, name in enumerate(model.joint_names):
+            children = [first + int(child) for child in np.flatnonzero(joint == model.parents)]
             node = self._node(f"{side}_{name}", hand.offsets[joint], None, children)
             if joint == 0:
                 self._animate(node, hand.wrist[:, :3], hand.wrist[:, 3:])
-            elif joint < BONE_COUNT:
+            elif joint < model.bone_count:
                 self._animate(node, None, hand.rotations[:, joint])
-        mesh, bind = self._skin_mesh(side, hand.scale)
-        skin = {"joints": list(range(first, first + JOINT_COUNT)), "skeleton": first, "inverseBindMatrices": bind}
+        mesh, bind = self._skin_mesh(model, side, hand.scale)
+        skin = {"joints": list(range(first, first + model.joint_count)), "skeleton": first, "inverseBindMatrices": bind}
         self._skins.append(skin | {"name": f"{side}_hand"})
         body = self._node(f"{side}_hand", None, mesh, [])
         self._document["nodes"][body]["skin"] = len(self._skins) - 1
@@ -106,12 +103,13 @@ class _Scene:
             self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
             self._document["nodes"][node][path] = keys[0].tolist()
 
-    def _skin_mesh(self, side: Side, scale: float) -> tuple[int, int]:
+    def _skin_mesh(self, model: Hand, side: Side, scale: float) -> tuple[int, int]:
         """The skin of a hand in its bind pose, and the accessor of the matrices from there to each joint."""
-        positions, rotations = forward_kinematics(BIND_ANGLES_RAD)
-        vertices, faces = scale * VERTICES, FACES
-        matrices = np.tile(np.eye(4), (JOINT_COUNT, 1, 1))
-        matrices[:, :3, :3] = rotations[np.where(np.arange(JOINT_COUNT) < BONE_COUNT, np.arange(JOINT_COUNT), PARENTS)]
+        positions, rotations = forward_kinematics(model, model.skin.bind_angles)
+        vertices, faces = scale * model.skin.vertices, model.skin.faces
+        joints = np.arange(model.joint_count)
+        matrices = np.tile(np.eye(4), (len(joints), 1, 1))
+        matrices[:, :3, :3] = rotations[np.where(joints < model.bone_count, joints, model.parents)]
         matrices[:, :3, 3] = scale * positions
         if side == "left":
             vertices, faces = mirror_points(vertices), faces[:, ::-1]
@@ -119,10 +117,10 @@ class _Scene:
             matrices[:, :3, 3] = mirror_points(matrices[:, :3, 3])
         bind = np.linalg.inv(matrices)
         bind[:, 3] = [0.0, 0.0, 0.0, 1.0]
-        weights = _unit_sum(WEIGHTS)
-        joints = np.where(weights > 0.0, BONES, 0).astype(np.uint8)
+        weights = _unit_sum(model.skin.weights)
+        bones = np.where(weights > 0.0, model.skin.bones, 0).astype(np.uint8)
         attributes = {
-            "JOINTS_0": self._buffer.add(joints, ATTRIBUTE),
+            "JOINTS_0": self._buffer.add(bones, ATTRIBUTE),
             "WEIGHTS_0": self._buffer.add(weights, ATTRIBUTE),
         }
         normals = _vertex_normals(vertices, faces)

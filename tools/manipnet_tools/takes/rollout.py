@@ -10,15 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manipnet.actors.props import Prop, choose_prop
-from manipnet.geometry import Array
+from manipnet.geometry import SIDES, Array, Side, scale_positions
 from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.synthesizer import HandScene, HandStep, Side, Synthesizer
+from manipnet.synthesis.synthesizer import HandScene, HandStep, Synthesizer
 from manipnet.tracking.tick import BodyAtTick, Tick
 from manipnet.tracking.timeline import Timeline
 from manipnet_tools.takes.take import Take, TakeError
 
-SIDES: tuple[Side, ...] = ("left", "right")
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
@@ -137,7 +136,6 @@ def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0)
 
     For hands of another size than the model's the scene is as the model's hand would see it: smaller for a larger one.
     """
-    shrink = np.append(np.full(3, 1.0 / hand_scale), np.ones(4))
     windows = np.stack([ticks.bodies[name].windows for name in shapes])
     inputs = {}
     for side in SIDES:
@@ -146,9 +144,9 @@ def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0)
         object_windows = windows[held, np.arange(len(held))]
         inputs[side] = HandInput(
             side,
-            shrink * wrist,
-            shrink * other,
-            shrink * object_windows,
+            scale_positions(wrist, 1.0 / hand_scale),
+            scale_positions(other, 1.0 / hand_scale),
+            scale_positions(object_windows, 1.0 / hand_scale),
             tuple(shapes.values()),
             held,
             1.0 / hand_scale,

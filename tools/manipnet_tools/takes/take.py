@@ -1,7 +1,7 @@
 """Takes: recorded bodies, with captured fingers where there are any, read from every supported file.
 
 All are in the project frame: right-handed, Y up, metres, seconds, quaternions xyzw. Bodies `left_wrist` and
-`right_wrist` are the wrist frames of `manipnet.synthesis.hand.skeleton`, the left one its mirror image.
+`right_wrist` are the wrist frames of `manipnet.synthesis.hand.hand`, the left one its mirror image.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from manipnet.geometry import mirror_points, mirror_poses, mirror_quats, quat_multiply, quat_rotate
 from manipnet.recording.mcap_file import RecordingError, read_bodies
-from manipnet.synthesis.hand.skeleton import BONE_COUNT, JOINT_NAMES, OFFSETS_M, PARENTS
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.takes.bvh_motion import Bvh, BvhError, read_bvh
 from manipnet_tools.takes.motive_csv import MotiveCsvError, read_motive_csv
@@ -154,7 +155,8 @@ def read_bvh_folder(folder: Path) -> Take:
     if len(set(lengths.values())) > 1 or len(rates) > 1:
         raise TakeError(f"{folder}: files must share length and rate, found {lengths} frames at {sorted(rates)} Hz")
     rate_hz = rates.pop()
-    fingers = {side: _hand(folder / f"{side}Hand.bvh", files.pop(f"{side}Hand"), side) for side in SIDES}
+    subject = shipped_hand()  # the dataset's subject, whose fingertips its files lack
+    fingers = {side: _hand(folder / f"{side}Hand.bvh", files.pop(f"{side}Hand"), side, subject) for side in SIDES}
     tracks = {
         f"{side}_wrist": np.concatenate([hand.positions[:, 0], hand.rotations[:, 0]], axis=-1)
         for side, hand in fingers.items()
@@ -173,20 +175,21 @@ def _root_poses(bvh: Bvh) -> Array:
     return mirror_poses(np.concatenate([DECIMETRE_M * translations[:, 0], rotations[:, 0]], axis=-1))
 
 
-def _hand(path: Path, bvh: Bvh, side: str) -> Fingers:
-    """World joints and bone rotations; the tips, which the files lack, come from the skeleton."""
+def _hand(path: Path, bvh: Bvh, side: str, subject: Hand) -> Fingers:
+    """World joints and bone rotations; the tips, which the files lack, come from the `subject`."""
     names = [joint.name for joint in bvh.joints]
-    if names != list(JOINT_NAMES[:BONE_COUNT]):
-        raise TakeError(f"{path}: joints must be {' '.join(JOINT_NAMES[:BONE_COUNT])}, found {' '.join(names)}")
+    expected, bones = subject.joint_names[: subject.bone_count], subject.bone_count
+    if names != list(expected):
+        raise TakeError(f"{path}: joints must be {' '.join(expected)}, found {' '.join(names)}")
     translations, rotations = bvh.local_transforms()
     translations, local = DECIMETRE_M * mirror_points(translations), mirror_quats(rotations)
-    tips = OFFSETS_M[BONE_COUNT:] if side == "right" else mirror_points(OFFSETS_M[BONE_COUNT:])
-    positions = np.empty((len(local), len(PARENTS), 3))
-    world = np.empty((len(local), BONE_COUNT, 4))
+    tips = subject.offsets[bones:] if side == "right" else mirror_points(subject.offsets[bones:])
+    positions = np.empty((len(local), subject.joint_count, 3))
+    world = np.empty((len(local), bones, 4))
     positions[:, 0], world[:, 0] = translations[:, 0], local[:, 0]
-    for j, parent in enumerate(PARENTS[1:], start=1):
-        offset = translations[:, j] if j < BONE_COUNT else tips[j - BONE_COUNT]
+    for j, parent in enumerate(subject.parents[1:], start=1):
+        offset = translations[:, j] if j < bones else tips[j - bones]
         positions[:, j] = positions[:, parent] + quat_rotate(world[:, parent], offset)
-        if j < BONE_COUNT:
+        if j < bones:
             world[:, j] = quat_multiply(world[:, parent], local[:, j])
     return Fingers(positions, world)

@@ -11,23 +11,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from manipnet.geometry import Array
+from manipnet.synthesis.hand.hand import Hand
 from manipnet_tools.training.dataset import TICK_FRAMES, HandTrack, Samples, concatenate, samples_at
 
 Policy = Callable[[np.ndarray], Array]
-"""From feature rows `(N, 2356)` to angles `(N, 20)` inside the limits."""
+"""From feature rows `(N, input_size)` to angles `(N, A)` inside the limits."""
 
 
 def led_back(before: Array, captured_before: Array, captured: Array, kept: float) -> Array:
-    """The answer `(N, 20)` for a tick that starts at `before` while the captured hand was at `captured_before`."""
+    """The answer `(N, A)` for a tick that starts at `before` while the captured hand was at `captured_before`."""
     return captured + kept * (before - captured_before)
 
 
-def blended_poses(captured: Array, pool: Array, rng: np.random.Generator) -> Array:
-    """Each pose of `captured (N, 20)` blended toward another of `pool`, as a whole or finger by finger."""
+def blended_poses(hand: Hand, captured: Array, pool: Array, rng: np.random.Generator) -> Array:
+    """Each pose of `captured (N, A)` blended toward another of `pool`, as a whole or finger by finger."""
     count = len(captured)
     other = pool[rng.integers(len(pool), size=count)]
     whole = rng.random((count, 1)) ** 1.5
-    fingers = np.repeat(rng.random((count, 5)) ** 1.5 * (rng.random((count, 5)) < 0.5), 4, axis=1)
+    shape = count, len(hand.fingers)
+    fingers = (rng.random(shape) ** 1.5 * (rng.random(shape) < 0.5))[:, hand.finger_of_angle]
     blend = np.where(rng.random((count, 1)) < 0.5, whole, fingers)
     return captured + blend * (other - captured) + rng.normal(0.0, 0.02, captured.shape)
 
@@ -57,7 +59,7 @@ def captured_samples(
     captured = track.angles_at(frames + lesson.lead_frames * speed)
     before = captured_before
     if pool is not None:
-        before = np.clip(blended_poses(captured_before, pool, rng), limits[:, 0], limits[:, 1])
+        before = np.clip(blended_poses(track.hand, captured_before, pool, rng), limits[:, 0], limits[:, 1])
     after = led_back(before, captured_before, captured, lesson.kept)
     return samples_at(track, frames, before, after, track.windows(frames, speed) if warp else None)
 
@@ -71,7 +73,7 @@ def self_made_samples(
     states = []
     for track, at in zip(tracks, frames, strict=True):
         before = track.angles_at(at - TICK_FRAMES)
-        states.append(np.where(rng.random((starts, 1)) < 0.5, before, blended_poses(before, pool, rng)))
+        states.append(np.where(rng.random((starts, 1)) < 0.5, before, blended_poses(track.hand, before, pool, rng)))
     states = [np.clip(state, limits[:, 0], limits[:, 1]) for state in states]
     parts: list[Samples] = []
     for _ in range(ticks):

@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from manipnet.geometry import Array, mirror_points, mirror_poses, mirror_quats, quat_to_matrix
+from manipnet.geometry import Array, continuous_quats, mirror_points, mirror_poses, mirror_quats, quat_to_matrix
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import angles_from_rotations, forward_kinematics
 from manipnet.synthesis.model.features import Windows, features, joint_distances, pose_outputs
 from manipnet.synthesis.model.layout import WINDOW_STEP_S
+from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import Shape, load_shape
 from manipnet_tools.takes.take import Take, read_take
 
@@ -28,6 +30,8 @@ class HandTrack:
     """One captured hand as the network sees it, a left hand mirrored into a right one, at 120 Hz."""
 
     name: str
+    hand: Hand
+    """The subject's."""
     shape: Shape
     mirrored: bool
     wrist: Array
@@ -37,7 +41,7 @@ class HandTrack:
     object: Array
     """`(T, 7)`"""
     angles: Array
-    """`(T, 20)` captured fingers."""
+    """`(T, A)` captured fingers."""
 
     def __len__(self) -> int:
         return len(self.wrist)
@@ -60,7 +64,7 @@ class HandTrack:
         )
 
     def angles_at(self, at: np.ndarray) -> Array:
-        """Captured angles at fractional frames `(N,)`, `(N, 20)`."""
+        """Captured angles at fractional frames `(N,)`, `(N, A)`."""
         return _between(self.angles, np.clip(at, 0, len(self) - 1))
 
 
@@ -76,15 +80,12 @@ def _between(values: Array, at: Array) -> Array:
 
 def continuous(poses: Array) -> Array:
     """Poses `(T, 7)` with quaternion signs chosen so that neighbours are close."""
-    poses = poses.copy()
-    flips = np.sum(poses[1:, 3:] * poses[:-1, 3:], axis=1) < 0.0
-    poses[1:, 3:] *= np.where(np.cumsum(flips) % 2 == 1, -1.0, 1.0)[:, None]
-    return poses
+    return np.concatenate([poses[:, :3], continuous_quats(poses[:, 3:])], axis=1)
 
 
 def hand_tracks(take: Take, shapes: dict[str, Shape]) -> list[HandTrack]:
     """Both hands of a take with captured fingers; `shapes` by object name."""
-    name = take.objects[0]
+    name, subject = take.objects[0], shipped_hand()
     tracks = []
     for side, other in (("right", "left"), ("left", "right")):
         mirrored = side == "left"
@@ -96,10 +97,11 @@ def hand_tracks(take: Take, shapes: dict[str, Shape]) -> list[HandTrack]:
             positions = mirror_points(positions)
         world = quat_to_matrix(quats)
         local = np.swapaxes(world[:, :1], -1, -2) @ world
-        angles = angles_from_rotations(local)
+        angles = angles_from_rotations(subject, local)
         tracks.append(
             HandTrack(
                 f"{take.name}/{side}",
+                subject,
                 shapes[name],
                 mirrored,
                 continuous(wrist),
@@ -124,7 +126,7 @@ def load_tracks(data: Path, takes: Iterable[str] | None = None) -> list[HandTrac
 
 @dataclass(frozen=True)
 class Samples:
-    """Network inputs `(N, 2356)` and outputs `(N, 220)`, float32, SI units."""
+    """Network inputs `(N, input_size)` and outputs `(N, output_size)`, float32, SI units."""
 
     inputs: np.ndarray
     outputs: np.ndarray
@@ -141,8 +143,9 @@ def concatenate(parts: Sequence[Samples]) -> Samples:
 def samples_at(
     track: HandTrack, frames: np.ndarray, before: Array, after: Array, windows: Windows | None = None
 ) -> Samples:
-    """Samples of ticks at `frames (N,)`: the pose `before (N, 20)` the tick is seen, `after (N, 20)` is the answer."""
+    """Samples of ticks at `frames (N,)`: the pose `before (N, A)` the tick is seen, `after (N, A)` is the answer."""
     windows = track.windows(frames) if windows is None else windows
-    inputs = features(track.shape, windows, *forward_kinematics(before))
-    positions, rotations = forward_kinematics(after)
-    return Samples(inputs, pose_outputs(positions, rotations, joint_distances(track.shape, windows, positions)))
+    hand, shape = track.hand, track.shape
+    inputs = features(hand, shape, windows, *forward_kinematics(hand, before))
+    positions, rotations = forward_kinematics(hand, after)
+    return Samples(inputs, pose_outputs(hand, positions, rotations, joint_distances(shape, windows, positions)))

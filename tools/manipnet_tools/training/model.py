@@ -2,7 +2,7 @@
 
 import io
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,7 +10,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from manipnet.synthesis.model.layout import ENCODED, INPUT, INPUT_SIZE, OUTPUT, OUTPUT_SIZE, PRESENT
+from manipnet.synthesis.model.layout import PRESENT, Block, Layout
 
 Architecture = Literal["manipnet", "resnet", "mlp"]
 
@@ -44,15 +44,16 @@ class Normalisation:
     """Whether the output statistics are of the change since the pose that went in."""
 
 
-def normalisation(inputs: np.ndarray, outputs: np.ndarray, carries_pose: bool) -> Normalisation:
-    """Statistics of samples `(N, 2356)` and `(N, 220)`."""
+def normalisation(layout: Layout, inputs: np.ndarray, outputs: np.ndarray, carries_pose: bool) -> Normalisation:
+    """Statistics of samples `(N, input_size)` and `(N, output_size)`."""
+    pose = layout.encoded["pose"]
     if carries_pose:
         outputs = outputs.copy()
-        outputs[:, _POSE] -= inputs[:, _POSE]
+        outputs[:, pose] -= inputs[:, pose]
     floors = _CHANGE_FLOORS if carries_pose else _OUTPUT_FLOORS
     return Normalisation(
-        *_statistics(inputs, _floors(INPUT, _INPUT_FLOORS, INPUT_SIZE)),
-        *_statistics(outputs, _floors(OUTPUT, floors, OUTPUT_SIZE)),
+        *_statistics(inputs, _floors(layout.input, _INPUT_FLOORS)),
+        *_statistics(outputs, _floors(layout.output, floors)),
         carries_pose,
     )
 
@@ -62,11 +63,8 @@ def _statistics(values: np.ndarray, floors: np.ndarray) -> tuple[np.ndarray, np.
     return values.mean(axis=0, dtype=np.float64).astype(np.float32), std.astype(np.float32)
 
 
-def _floors(layout, floors, size) -> np.ndarray:
-    columns = np.empty(size)
-    for name, block in layout.items():
-        columns[block.columns] = floors[name]
-    return columns
+def _floors(blocks: Mapping[str, Block], floors: Mapping[str, float]) -> np.ndarray:
+    return np.concatenate([np.full(block.stop - block.start, floors[name]) for name, block in blocks.items()])
 
 
 _FUTURE = {
@@ -78,20 +76,18 @@ _FUTURE = {
     "signed_distances": 2,
 }
 """First row of each block that lies more than 0.1 s ahead."""
-_POSE = ENCODED["pose"]
-_ENCODED_SIZES = [columns.stop - columns.start for columns in ENCODED.values()]
 
 
-def hidden_columns(names: Sequence[str]) -> np.ndarray:
-    """Which of the 2356 inputs are meant by block names, or by `future` (what lies more than 0.1 s ahead)."""
-    mask = np.zeros(INPUT_SIZE, dtype=np.bool_)
+def hidden_columns(layout: Layout, names: Sequence[str]) -> np.ndarray:
+    """Mask `(input_size,)` of the inputs that block names, or `future` (more than 0.1 s ahead), stand for."""
+    mask = np.zeros(layout.input_size, dtype=np.bool_)
     for name in names:
         if name == "future":
             for block, first in _FUTURE.items():
-                rows = np.arange(INPUT_SIZE)[INPUT[block].columns].reshape(INPUT[block].shape)
+                rows = np.arange(layout.input_size)[layout.input[block].columns].reshape(layout.input[block].shape)
                 mask[rows[first:].ravel()] = True
         else:
-            mask[INPUT[name].columns] = True
+            mask[layout.input[name].columns] = True
     return mask
 
 
@@ -122,6 +118,7 @@ class ManipNet(nn.Module):
 
     def __init__(
         self,
+        layout: Layout,
         norm: Normalisation,
         width: int = 1536,
         dropout: float = 0.3,
@@ -133,14 +130,16 @@ class ManipNet(nn.Module):
         for name in ("input_mean", "output_mean", "output_std"):
             self.register_buffer(name, torch.from_numpy(getattr(norm, name).copy()))
         gain = 1.0 / norm.input_std
-        gain[hidden_columns(hidden)] = 0.0
+        gain[hidden_columns(layout, hidden)] = 0.0
         self.register_buffer("input_gain", torch.from_numpy(gain))
         self.carries_pose = norm.carries_pose
+        self.layout = layout
+        self._encoded_sizes = [columns.stop - columns.start for columns in layout.encoded.values()]
         third = width // 3
-        self.encoders = nn.ModuleList(nn.Linear(s.stop - s.start, third) for s in ENCODED.values())
+        self.encoders = nn.ModuleList(nn.Linear(size, third) for size in self._encoded_sizes)
         dense, residual = architecture == "manipnet", architecture != "mlp"
         self.blocks = nn.Sequential(*(ResidualDenseBlock(3 * third, dropout, dense, residual) for _ in range(2)))
-        self.decoder = nn.Linear(3 * third, OUTPUT_SIZE)
+        self.decoder = nn.Linear(3 * third, layout.output_size)
         self.dropout = nn.Dropout(dropout)
         for layer in self.modules():
             if isinstance(layer, nn.Linear):
@@ -152,7 +151,7 @@ class ManipNet(nn.Module):
         x = (features - self.input_mean) * self.input_gain
         parts = [
             encode(self.dropout(part))
-            for encode, part in zip(self.encoders, torch.split(x, _ENCODED_SIZES, dim=1), strict=True)
+            for encode, part in zip(self.encoders, torch.split(x, self._encoded_sizes, dim=1), strict=True)
         ]
         return self.decoder(self.dropout(self.blocks(torch.cat(parts, dim=1))))
 
@@ -161,14 +160,14 @@ class ManipNet(nn.Module):
         return (outputs - self._carried(features) - self.output_mean) / self.output_std
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:
-        """Features `(N, 2356)` to outputs `(N, 220)`."""
+        """Features `(N, input_size)` to outputs `(N, output_size)`."""
         return self.normalised(features) * self.output_std + self.output_mean + self._carried(features)
 
     def _carried(self, features: torch.Tensor) -> torch.Tensor:
-        pose, _, _ = torch.split(features, _ENCODED_SIZES, dim=1)
+        pose, _, _ = torch.split(features, self._encoded_sizes, dim=1)
         if not self.carries_pose:
             pose = torch.zeros_like(pose)
-        return torch.nn.functional.pad(pose, (0, OUTPUT_SIZE - _ENCODED_SIZES[0]))
+        return torch.nn.functional.pad(pose, (0, self.layout.output_size - self._encoded_sizes[0]))
 
 
 def export_onnx(model: ManipNet) -> bytes:
@@ -181,7 +180,7 @@ def export_onnx(model: ManipNet) -> bytes:
         warnings.filterwarnings("ignore", "Constant folding")
         torch.onnx.export(
             model,
-            (torch.zeros(2, INPUT_SIZE),),
+            (torch.zeros(2, model.layout.input_size),),
             buffer,  # pyright: ignore[reportArgumentType]: the older exporter takes files
             dynamo=False,
             input_names=["features"],

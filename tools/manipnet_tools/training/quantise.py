@@ -10,6 +10,7 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 from tyro.conf import Positional
 
+from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.model.bundle import load_bundle
 
 _LEAST_VALUES = 4096
@@ -147,4 +148,5 @@ def run(options: QuantiseOptions) -> None:
     }
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / "manipnet.onnx").write_bytes(content)
+    write_hand(bundle.hand, options.out / HAND_FILE)
     (options.out / "bundle.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")

@@ -14,10 +14,11 @@ import numpy as np
 import torch
 
 from manipnet.geometry import Array
-from manipnet.synthesis.hand.skeleton import DOF_NAMES
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.model.bundle import FORMAT
 from manipnet.synthesis.model.decode import angles_from_outputs
-from manipnet.synthesis.model.layout import describe
+from manipnet.synthesis.model.layout import layout_of
 from manipnet_tools.training.augment import Lesson, captured_samples, self_made_samples
 from manipnet_tools.training.dataset import TICK_FRAMES, HandTrack, Samples, concatenate, load_tracks
 from manipnet_tools.training.model import Architecture, ManipNet, export_onnx, normalisation
@@ -74,6 +75,7 @@ class Trained:
     """A trained model with what a bundle needs besides."""
 
     model: ManipNet
+    hand: Hand
     rest_angles: Array
     limits: Array
     config: TrainConfig
@@ -91,12 +93,13 @@ def spans_of(tracks: Sequence[HandTrack], share: float) -> list[tuple[int, int]]
 class Learner:
     """One model in training: `learn` from samples, round by round, at a falling rate."""
 
-    def __init__(self, first: Samples, config: TrainConfig) -> None:
+    def __init__(self, hand: Hand, first: Samples, config: TrainConfig) -> None:
         """`first` samples give the normalisation."""
-        norm = normalisation(first.inputs, first.outputs, config.carries_pose)
+        layout = layout_of(hand)
+        norm = normalisation(layout, first.inputs, first.outputs, config.carries_pose)
         self._config = config
         self._rng = np.random.default_rng(config.seed)
-        self._last = ManipNet(norm, config.width, config.dropout, config.architecture, config.hidden)
+        self._last = ManipNet(layout, norm, config.width, config.dropout, config.architecture, config.hidden)
         self._average = torch.optim.swa_utils.AveragedModel(
             self._last, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.average)
         )
@@ -148,6 +151,7 @@ class Lessons:
         """The first `share` of every track is used."""
         self._spans = spans_of(tracks, share)
         self._tracks, self._config = list(tracks), config
+        self.hand = tracks[0].hand
         self._rng = np.random.default_rng(config.seed)
         seen = [track.angles[low:high:4] for track, (low, high) in zip(tracks, self._spans, strict=True)]
         self._pool = np.concatenate(seen)
@@ -178,7 +182,7 @@ class Lessons:
         config = self._config
         wanted = config.self_made * np.mean([high - low for low, high in self._spans])
         starts = max(int(wanted / config.roll_out_ticks), 1)
-        policy = policy_of(model, self.limits)
+        policy = policy_of(model, self.hand, self.limits)
         return self_made_samples(
             self._tracks, self._spans, policy, starts, config.roll_out_ticks, lesson, self._pool, self.limits, self._rng
         )
@@ -192,7 +196,7 @@ def train(tracks: Sequence[HandTrack], config: TrainConfig, share: float = 1.0) 
     torch.manual_seed(config.seed)
     lessons = Lessons(tracks, config, share)
     samples = lessons.next_round(None)
-    learner = Learner(samples, config)
+    learner = Learner(lessons.hand, samples, config)
     for turn in range(config.rounds):
         if turn:
             samples = lessons.next_round(learner.model)
@@ -209,36 +213,39 @@ def trained(
 ) -> Trained:
     """What has been learned, ready to be saved."""
     takes = tuple(sorted({track.name.split("/")[0] for track in tracks}))
-    return Trained(learner.model.eval(), lessons.rest_angles, lessons.limits, config, takes, share, seconds)
+    return Trained(
+        learner.model.eval(), lessons.hand, lessons.rest_angles, lessons.limits, config, takes, share, seconds
+    )
 
 
 def pose_limits(angles: Array) -> Array:
-    """Limits `(20, 2)`: the 0.5 and 99.5 percentiles of `angles (N, 20)`, widened by seven degrees."""
+    """Limits `(A, 2)`: the 0.5 and 99.5 percentiles of `angles (N, A)`, widened by seven degrees."""
     low, high = np.percentile(angles, [0.5, 99.5], axis=0)
     return np.stack([low - LIMIT_MARGIN_RAD, high + LIMIT_MARGIN_RAD], axis=1)
 
 
-def policy_of(model: ManipNet, limits: Array):
+def policy_of(model: ManipNet, hand: Hand, limits: Array):
     """The model as a function from features to angles."""
     model.eval()
 
     def policy(rows: np.ndarray) -> Array:
         with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
             outputs = model(torch.from_numpy(rows))
-        return angles_from_outputs(outputs.double().numpy(), limits)
+        return angles_from_outputs(hand, outputs.double().numpy(), limits)
 
     return policy
 
 
 def save_bundle(trained: Trained, folder: Path) -> None:
-    """Write `manipnet.onnx` and `bundle.json`."""
+    """Write `manipnet.onnx`, `hand.npz` and `bundle.json`."""
     folder.mkdir(parents=True, exist_ok=True)
     content = halve_weights(export_onnx(trained.model))
     (folder / "manipnet.onnx").write_bytes(content)
+    write_hand(trained.hand, folder / HAND_FILE)
     meta = {
         "format": FORMAT,
-        "layout": describe(),
-        "dofs": list(DOF_NAMES),
+        "layout": layout_of(trained.hand).describe(),
+        "angle_names": list(trained.hand.angle_names),
         "rest_angles_rad": [round(float(a), 6) for a in trained.rest_angles],
         "response": trained.config.response,
         "limits_rad": np.round(trained.limits, 6).tolist(),

@@ -12,8 +12,8 @@ import numpy as np
 from manipnet.geometry import Array, compose, invert
 from manipnet.outputs.axes import to_unreal
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
-from manipnet.synthesis.hand.openxr import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 from manipnet.wire import Side
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 ORDER = (1, 0, *range(2, 26))
 """The wrist comes first, since Live Link expects parents before children."""

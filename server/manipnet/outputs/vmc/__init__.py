@@ -20,7 +20,7 @@ def _open(options: VmcOptions, emission: Emission) -> HandsOutput:
     from manipnet.outputs.vmc.sender import VmcSender
 
     assert options.vmc is not None  # `open_outputs` opens what is turned on
-    return VmcSender(*resolve(*options.vmc))
+    return VmcSender(*resolve(*options.vmc), emission.hand)
 
 
 VMC = Output("vmc", "VMC bones, OSC over UDP, for programs that show avatars", VmcOptions, _open)

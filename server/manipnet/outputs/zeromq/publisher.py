@@ -61,7 +61,7 @@ class ZmqPublisher(HandsOutput):
         if self._retry_s is None or time.monotonic() < self._retry_s:
             return False
         try:
-            self._bound = self._bind(int(self.address.rpartition(":")[2]))
+            self._bound = self._bind(int(str(self.address).rpartition(":")[2]))
         except (OSError, ValueError) as error:
             self._fail(error)
             return False

@@ -1,66 +1,28 @@
-"""Forward kinematics of the 20 angles, and the angles nearest to given bone rotations.
+"""Forward kinematics of a hand's angles, and the angles nearest to given bone rotations.
 
-All results are in the wrist frame of a right hand (see `skeleton`). The kernels ending in `_into` take one hand, write
-into arrays of the caller and are what the live tick and the solver call; the functions without take any leading shape.
+All results are in the wrist frame of a right hand (see `hand`). Kernels ending in `_into` take the `Skeleton` of one
+hand and write into arrays of the caller; the tick and the solvers call them. Functions that take a `Hand` accept any
+leading shape.
 """
 
 import numpy as np
 
-from manipnet.geometry import Array, quat_to_matrix
+from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, matrix, stack_array
-from manipnet.synthesis.hand.skeleton import (
-    BONE_COUNT,
-    DOF_AXES,
-    DOF_COUNT,
-    DOF_JOINTS,
-    JOINT_COUNT,
-    OFFSETS_M,
-    PARENTS,
-    REST_QUATS,
+from manipnet.synthesis.hand.hand import MAX_ANGLES, Hand, Skeleton
+from manipnet.synthesis.hand.packed import unpack_skeleton
+from manipnet.synthesis.rotations import (
+    axis_rotation_into,
+    copy_matrix_into,
+    multiply_matrices_into,
+    set_identity,
 )
 
-_axes = stack_array(DOF_COUNT, 3)
-_REST = quat_to_matrix(REST_QUATS)
-_FIRST_DOF = np.array([int(np.argmax(j == DOF_JOINTS)) if j in DOF_JOINTS else -1 for j in range(BONE_COUNT)])
-_DOFS_OF_BONE = np.array([int(np.sum(j == DOF_JOINTS)) for j in range(BONE_COUNT)])
+_axes = stack_array(MAX_ANGLES, 3)
 
 
 @inner
-def axis_rotation_into(axis, angle, out):
-    """Rodrigues' formula: the matrix turning by `angle` about the unit `axis`, into `out` `(3, 3)`."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y, z = axis[0], axis[1], axis[2]
-    k = 1.0 - c
-    out[0, 0], out[0, 1], out[0, 2] = c + x * x * k, x * y * k - z * s, x * z * k + y * s
-    out[1, 0], out[1, 1], out[1, 2] = y * x * k + z * s, c + y * y * k, y * z * k - x * s
-    out[2, 0], out[2, 1], out[2, 2] = z * x * k - y * s, z * y * k + x * s, c + z * z * k
-
-
-@inner
-def _copy_into(a, out):
-    # a slice assignment would compile numpy's broadcasting, with its error texts, for seconds
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, j]
-
-
-@inner
-def set_identity(out):
-    """The identity into `out (3, 3)`."""
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = 1.0 if i == j else 0.0
-
-
-@inner
-def _multiply_into(a, b, out):
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
-
-
-@inner
-def _apply_offset_into(parent_position, parent_rotation, offset, out):
+def _apply_offset_into(parent_position: Array, parent_rotation: Array, offset: Array, out: Array):
     for i in range(3):
         out[i] = parent_position[i] + (
             parent_rotation[i, 0] * offset[0] + parent_rotation[i, 1] * offset[1] + parent_rotation[i, 2] * offset[2]
@@ -68,33 +30,35 @@ def _apply_offset_into(parent_position, parent_rotation, offset, out):
 
 
 @inner
-def forward_kinematics_into(angles, positions, rotations, axes):
-    """Pose of one hand: `angles (20,)` into `positions (22, 3)`, `rotations (17, 3, 3)`, hinge `axes (20, 3)`."""
+def forward_kinematics_into(skeleton: Skeleton, angles: Array, positions: Array, rotations: Array, axes: Array):
+    """Pose one hand: `angles (A,)` into `positions (J, 3)`, `rotations (B, 3, 3)` and hinge `axes (A, 3)`."""
+    parents, offsets, hinges, bones = skeleton.parents, skeleton.offsets, skeleton.axes, len(skeleton.rest)
     hinge, turned = matrix(), matrix()
     positions[0] = 0.0
     set_identity(rotations[0])
-    for bone in range(1, BONE_COUNT):
-        parent = PARENTS[bone]
-        _apply_offset_into(positions[parent], rotations[parent], OFFSETS_M[bone], positions[bone])
+    for bone in range(1, bones):
+        parent = parents[bone]
+        _apply_offset_into(positions[parent], rotations[parent], offsets[bone], positions[bone])
         frame = rotations[bone]
-        _copy_into(rotations[parent], frame)
-        for dof in range(_FIRST_DOF[bone], _FIRST_DOF[bone] + _DOFS_OF_BONE[bone]):
+        copy_matrix_into(rotations[parent], frame)
+        first = skeleton.first_angle[bone]
+        for angle in range(first, first + skeleton.angle_counts[bone]):
             for i in range(3):
-                axes[dof, i] = (
-                    frame[i, 0] * DOF_AXES[dof, 0] + frame[i, 1] * DOF_AXES[dof, 1] + frame[i, 2] * DOF_AXES[dof, 2]
+                axes[angle, i] = (
+                    frame[i, 0] * hinges[angle, 0] + frame[i, 1] * hinges[angle, 1] + frame[i, 2] * hinges[angle, 2]
                 )
-            axis_rotation_into(DOF_AXES[dof], angles[dof], hinge)
-            _multiply_into(frame, hinge, turned)
-            _copy_into(turned, frame)
-        _multiply_into(frame, _REST[bone], turned)
-        _copy_into(turned, frame)
-    for tip in range(BONE_COUNT, JOINT_COUNT):
-        parent = PARENTS[tip]
-        _apply_offset_into(positions[parent], rotations[parent], OFFSETS_M[tip], positions[tip])
+            axis_rotation_into(hinges[angle], angles[angle], hinge)
+            multiply_matrices_into(frame, hinge, turned)
+            copy_matrix_into(turned, frame)
+        multiply_matrices_into(frame, skeleton.rest[bone], turned)
+        copy_matrix_into(turned, frame)
+    for tip in range(bones, len(parents)):
+        parent = parents[tip]
+        _apply_offset_into(positions[parent], rotations[parent], offsets[tip], positions[tip])
 
 
 @inner
-def _hinge_angle(m, axis):
+def _hinge_angle(m: Array, axis: Array):
     """Angle about `axis` of the rotation nearest to the matrix `m`: the maximiser of trace(R(angle)ᵀ m)."""
     x, y, z = axis[0], axis[1], axis[2]
     sine = x * (m[2, 1] - m[1, 2]) + y * (m[0, 2] - m[2, 0]) + z * (m[1, 0] - m[0, 1])
@@ -106,7 +70,7 @@ def _hinge_angle(m, axis):
 
 
 @inner
-def _turn_about(u, v, m):
+def _turn_about(u: Array, v: Array, m: Array):
     """Angle about the unit axis `u` that turns `v` into the direction of `m v`, seen along the axis."""
     x = m[0, 0] * v[0] + m[0, 1] * v[1] + m[0, 2] * v[2]
     y = m[1, 0] * v[0] + m[1, 1] * v[1] + m[1, 2] * v[2]
@@ -117,11 +81,11 @@ def _turn_about(u, v, m):
 
 
 @inner
-def angles_from_rotations_into(rotations, angles):
-    """The 20 angles whose hand is nearest to bone `rotations (17, 3, 3)`, joint by joint, into `angles (20,)`."""
+def angles_from_rotations_into(skeleton: Skeleton, rotations: Array, angles: Array):
+    """The angles whose hand is nearest to bone `rotations (B, 3, 3)`, joint by joint, into `angles (A,)`."""
     local, work, back = matrix(), matrix(), matrix()
-    for bone in range(1, BONE_COUNT):
-        parent = rotations[PARENTS[bone]]
+    for bone in range(1, len(skeleton.rest)):
+        parent = rotations[skeleton.parents[bone]]
         for i in range(3):
             for j in range(3):
                 work[i, j] = 0.0
@@ -131,44 +95,46 @@ def angles_from_rotations_into(rotations, angles):
             for j in range(3):
                 local[i, j] = 0.0
                 for k in range(3):
-                    local[i, j] += work[i, k] * _REST[bone, j, k]
-        first = _FIRST_DOF[bone]
-        if _DOFS_OF_BONE[bone] == 2:
-            u, v = DOF_AXES[first], DOF_AXES[first + 1]
+                    local[i, j] += work[i, k] * skeleton.rest[bone, j, k]
+        first, count = skeleton.first_angle[bone], skeleton.angle_counts[bone]
+        if count == 2:
+            u, v = skeleton.axes[first], skeleton.axes[first + 1]
             # local = R(u, flexion) R(v, abduction) leaves v where the flexion alone puts it
             angles[first] = _turn_about(u, v, local)
             axis_rotation_into(u, -angles[first], back)
-            _multiply_into(back, local, work)
+            multiply_matrices_into(back, local, work)
             angles[first + 1] = _hinge_angle(work, v)
-        else:
-            angles[first] = _hinge_angle(local, DOF_AXES[first])
+        elif count == 1:
+            angles[first] = _hinge_angle(local, skeleton.axes[first])
 
 
 @kernel
-def _forward_batch(angles, positions, rotations):
-    axes = _axes()
+def _forward_batch(hand: np.ndarray, angles: Array, positions: Array, rotations: Array):
+    skeleton, axes = unpack_skeleton(hand), _axes()
     for i in range(len(angles)):
-        forward_kinematics_into(angles[i], positions[i], rotations[i], axes)
+        forward_kinematics_into(skeleton, angles[i], positions[i], rotations[i], axes)
 
 
 @kernel
-def _angles_batch(rotations, angles):
+def _angles_batch(hand: np.ndarray, rotations: Array, angles: Array):
+    skeleton = unpack_skeleton(hand)
     for i in range(len(rotations)):
-        angles_from_rotations_into(rotations[i], angles[i])
+        angles_from_rotations_into(skeleton, rotations[i], angles[i])
 
 
-def forward_kinematics(angles: Array) -> tuple[Array, Array]:
-    """Angles `(..., 20)` in radians to joint positions `(..., 22, 3)` in metres and rotations `(..., 17, 3, 3)`."""
-    flat = np.ascontiguousarray(angles, dtype=np.float64).reshape(-1, DOF_COUNT)
-    positions, rotations = np.empty((len(flat), JOINT_COUNT, 3)), np.empty((len(flat), BONE_COUNT, 3, 3))
-    _forward_batch(flat, positions, rotations)
+def forward_kinematics(hand: Hand, angles: Array) -> tuple[Array, Array]:
+    """Angles `(..., A)` in radians to joint positions `(..., J, 3)` in metres and rotations `(..., B, 3, 3)`."""
+    flat = np.ascontiguousarray(angles, dtype=np.float64).reshape(-1, hand.angle_count)
+    positions = np.empty((len(flat), hand.joint_count, 3))
+    rotations = np.empty((len(flat), hand.bone_count, 3, 3))
+    _forward_batch(hand.packed, flat, positions, rotations)
     lead = np.shape(angles)[:-1]
-    return positions.reshape(*lead, JOINT_COUNT, 3), rotations.reshape(*lead, BONE_COUNT, 3, 3)
+    return positions.reshape(*lead, *positions.shape[1:]), rotations.reshape(*lead, *rotations.shape[1:])
 
 
-def angles_from_rotations(rotations: Array) -> Array:
-    """Bone rotations `(..., 17, 3, 3)` in the wrist frame to the nearest angles `(..., 20)`; limits are not applied."""
-    flat = np.ascontiguousarray(rotations, dtype=np.float64).reshape(-1, BONE_COUNT, 3, 3)
-    angles = np.empty((len(flat), DOF_COUNT))
-    _angles_batch(flat, angles)
-    return angles.reshape(*np.shape(rotations)[:-3], DOF_COUNT)
+def angles_from_rotations(hand: Hand, rotations: Array) -> Array:
+    """Bone rotations `(..., B, 3, 3)` in the wrist frame to the nearest angles `(..., A)`; limits are not applied."""
+    flat = np.ascontiguousarray(rotations, dtype=np.float64).reshape(-1, hand.bone_count, 3, 3)
+    angles = np.empty((len(flat), hand.angle_count))
+    _angles_batch(hand.packed, flat, angles)
+    return angles.reshape(*np.shape(rotations)[:-3], hand.angle_count)

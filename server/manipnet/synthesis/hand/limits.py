@@ -1,13 +1,14 @@
-"""Angles kept where fingers can be."""
+"""Angles kept inside their limits and within reach of the last ones."""
 
+from manipnet.geometry import Array
 from manipnet.jit import kernel
 
 
 @kernel
-def keep_angles(angles, limits, last, reach, kept):
-    """`angles (20,)` inside `limits (20, 2)` and within `reach` of the `last (20,)`, into `kept (20,)`.
+def keep_angles(angles: Array, limits: Array, last: Array, reach: float, kept: Array):
+    """`angles (A,)` inside `limits (A, 2)` and within `reach` of the `last (A,)`, into `kept (A,)`.
 
-    Returns whether the limits and whether the reach made a difference.
+    Returns whether the limits made a difference, and whether the reach did.
     """
     beyond_limits, too_far = False, False
     for i in range(len(angles)):

@@ -1,175 +1,129 @@
-"""The hand as OpenXR and WebXR know it: 26 joints whose frames obey one rule on both hands.
+"""A hand as OpenXR and WebXR describe it: 26 joints whose frames obey one rule on both hands.
 
-Rule: -z runs along the bone to the fingertip, +y out of the back of the hand (of the nail, for a finger). The frames of
-our own bones are arbitrary, so each is turned by a fixed offset, found once on the flat hand.
+Rule: -z runs along the bone to the fingertip, +y out of the back of the hand (out of the nail, for a finger). The
+frames of our own bones are arbitrary, so each is turned by a fixed offset, found once on the flat hand.
 Sources: OpenXR specification, XR_EXT_hand_tracking, "Conventions of hand joints"; WebXR Hand Input, "Skeleton joints".
-VMC's (Unity's) finger bones are in `manipnet.outputs.vmc`: their thumb names sit one joint higher than these.
+The finger bones of VMC (Unity's) are in `manipnet.outputs.vmc`: their thumb names sit one joint higher than these.
 """
 
 from collections.abc import Sequence
-from functools import cache
-from typing import Final, Literal
+from functools import lru_cache
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from manipnet.geometry import Array, matrix_to_quat, mirror_quats
-from manipnet.jit import inner, kernel, stack_array, vector
+from manipnet.geometry import Array, Side, matrix_to_quat, mirror_quats
+from manipnet.jit import kernel, stack_array, vector
+from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Hand, Indices
 from manipnet.synthesis.hand.kinematics import forward_kinematics, forward_kinematics_into
-from manipnet.synthesis.hand.skeleton import (
-    BONE_COUNT,
-    DOF_AXES,
-    DOF_COUNT,
-    DOF_JOINTS,
-    DOF_NAMES,
-    FINGER_JOINTS,
-    PARENTS,
-)
+from manipnet.synthesis.hand.packed import unpack_skeleton
+from manipnet.synthesis.rotations import matrix_to_quat_into, multiply_quats_into, quat_rotate_into
 
-Side = Literal["left", "right"]
+METACARPAL_BASE: Final = 0.3
+"""Where a finger's metacarpal begins on the way from the wrist to its knuckle; the palm of our hand is one bone."""
+_HANDS_KEPT: Final = 32
 
-_FINGERS = ("index", "middle", "ring", "little")
-
-OPENXR_JOINT_NAMES: Final = (
-    "palm",
-    "wrist",
-    *(f"thumb_{part}" for part in ("metacarpal", "proximal", "distal", "tip")),
-    *(f"{f}_{part}" for f in _FINGERS for part in ("metacarpal", "proximal", "intermediate", "distal", "tip")),
-)
-
-OPENXR_PARENTS: Final = (1, -1, 1, 2, 3, 4, *(p for f in range(4) for p in (1, *range(6 + 5 * f, 10 + 5 * f))))
-"""Parent of each OpenXR joint: everything hangs on the wrist, which has none (-1)."""
+_positions, _rotations, _axes = stack_array(MAX_JOINTS, 3), stack_array(MAX_JOINTS, 3, 3), stack_array(MAX_ANGLES, 3)
+_quats, _quat = stack_array(MAX_JOINTS, 4), stack_array(4)
 
 
-def webxr_name(joint: str) -> str:
-    """An OpenXR joint's name in WebXR's spelling; WebXR itself has no palm."""
-    finger, _, part = joint.partition("_")
-    if not part:
-        return joint
-    if finger != "thumb":
-        finger = f"{finger.replace('little', 'pinky')}-finger"
-    return f"{finger}-{part}" if part in ("metacarpal", "tip") else f"{finger}-phalanx-{part}"
+class OpenXrFrames(NamedTuple):
+    """How the 26 OpenXR joints follow a hand's own."""
+
+    joints: Indices
+    """`(26,)` the joint on the way to which each lies from the wrist."""
+    shares: Array
+    """`(26,)` how far along that way: 1 at the joint itself."""
+    bones: Indices
+    """`(26,)` the bone that each turns with."""
+    offsets: Array
+    """`(2, 26, 4)` the frame of each in its bone's, on a right and on a left hand."""
 
 
-WEBXR_JOINT_NAMES: Final = tuple(webxr_name(name) for name in OPENXR_JOINT_NAMES[1:])
-"""The 25 joints of WebXR: OpenXR's from the wrist on, in the same order."""
+def pose_in_world(
+    hand: Hand, sides: Sequence[Side], angles: Array, T_world_wrist: Array, scale: float
+) -> tuple[Array, Array]:
+    """Poses of N hands of the size `scale` with `angles (N, A)` and wrists `(N, 7)`.
 
-_METACARPAL_BASE = 0.3
-"""Where a finger's metacarpal begins on the way from the wrist to its knuckle; our palm is one bone."""
-
-_KNUCKLE_AFTER = np.array([0] * 6 + [joint for chain in FINGER_JOINTS[1:] for joint in (chain[0], 0, 0, 0, 0)])
-"""The knuckle of ours at the end of each finger metacarpal, 0 for all other joints."""
-_MIDDLE_KNUCKLE = FINGER_JOINTS[2][0]
-
-# The joints of ours behind thumb and fingers. The thumb's metacarpal is bone 2, which both carpal angles have turned.
-_JOINTS = np.array([0, 0, *FINGER_JOINTS[0][1:], *(j for chain in FINGER_JOINTS[1:] for j in (0, *chain))])
-_BONES = np.where(_JOINTS < BONE_COUNT, _JOINTS, PARENTS[_JOINTS])
-
-_positions, _rotations, _axes = stack_array(22, 3), stack_array(BONE_COUNT, 3, 3), stack_array(DOF_COUNT, 3)
-_quats, _quat = stack_array(BONE_COUNT, 4), stack_array(4)
-
-
-def pose_in_world(sides: Sequence[Side], angles: Array, T_world_wrist: Array, scale: float) -> tuple[Array, Array]:
-    """Of N hands of the size `scale` with `angles (N, 20)` and wrists `(N, 7)`: bone rotations `(N, 17, 4)` local to
-    the parent bone, and world poses `(N, 26, 7)` of the OpenXR joints, xyz and xyzw.
-
-    Both are mirrored for a left hand; the wrist's rotation is the identity. Tips are turned like the bone before them.
-    Finger metacarpals, which our hand lacks, and the palm are turned like the wrist; the palm lies in the middle of the
+    Returns bone rotations `(N, B, 4)` local to the parent bone, the wrist's being the identity, and world poses
+    `(N, 26, 7)` of the OpenXR joints, xyz and xyzw. Both are mirrored for a left hand. Tips turn with the bone before
+    them. Finger metacarpals, which our hand lacks, and the palm turn with the wrist; the palm lies in the middle of the
     middle metacarpal.
     """
     left = np.array([side == "left" for side in sides])
-    local, joints = np.empty((len(left), BONE_COUNT, 4)), np.empty((len(left), len(_JOINTS), 7))
-    _pose_in_world(angles, T_world_wrist, left, scale, _flat_hand_offsets(), local, joints)
+    frames = openxr_frames(hand)
+    local, joints = np.empty((len(left), hand.bone_count, 4)), np.empty((len(left), len(frames.joints), 7))
+    _pose_in_world(hand.packed, frames, angles, T_world_wrist, left, scale, local, joints)
     return local, joints
 
 
-@inner
-def _rotate(q, v, out):
-    """The vector `v` turned by the unit quaternion `q`, into `out (3,)`."""
-    tx, ty, tz = 2 * (q[1] * v[2] - q[2] * v[1]), 2 * (q[2] * v[0] - q[0] * v[2]), 2 * (q[0] * v[1] - q[1] * v[0])
-    out[0] = v[0] + q[3] * tx + q[1] * tz - q[2] * ty
-    out[1] = v[1] + q[3] * ty + q[2] * tx - q[0] * tz
-    out[2] = v[2] + q[3] * tz + q[0] * ty - q[1] * tx
-
-
-@inner
-def _multiply(a, sign, b, out):
-    """Product of the quaternions `a`, its vector part times `sign`, and `b`, into `out (4,)`."""
-    ax, ay, az, aw = sign * a[0], sign * a[1], sign * a[2], a[3]
-    x, y = aw * b[0] + ax * b[3] + ay * b[2] - az * b[1], aw * b[1] - ax * b[2] + ay * b[3] + az * b[0]
-    z, w = aw * b[2] + ax * b[1] - ay * b[0] + az * b[3], aw * b[3] - ax * b[0] - ay * b[1] - az * b[2]
-    out[0], out[1], out[2], out[3] = x, y, z, w
-
-
-@inner
-def _quat_into(m, mirrored, out):
-    """Unit quaternion with w >= 0 of the rotation matrix `m`, or of its mirror image, into `out (4,)`.
-
-    By the largest of the four squared components, so it is stable at every angle (Shepperd 1978).
-    """
-    squares = (1 + m[0, 0] - m[1, 1] - m[2, 2], 1 - m[0, 0] + m[1, 1] - m[2, 2], 1 - m[0, 0] - m[1, 1] + m[2, 2])
-    w = 1 + m[0, 0] + m[1, 1] + m[2, 2]
-    if w >= squares[0] and w >= squares[1] and w >= squares[2]:
-        out[0], out[1], out[2], out[3] = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], w
-    elif squares[0] >= squares[1] and squares[0] >= squares[2]:
-        out[0], out[1], out[2], out[3] = squares[0], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]
-    elif squares[1] >= squares[2]:
-        out[0], out[1], out[2], out[3] = m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]
-    else:
-        out[0], out[1], out[2], out[3] = m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[2], m[1, 0] - m[0, 1]
-    length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
-    gain = -1.0 / length if out[3] < 0.0 else 1.0 / length
-    out[0] *= gain
-    out[1] *= -gain if mirrored else gain
-    out[2] *= -gain if mirrored else gain
-    out[3] *= gain
-
-
 @kernel
-def _pose_in_world(angles, wrists, left, scale, offsets, local, joints):
-    positions, rotations, axes = _positions(), _rotations(), _axes()
+def _pose_in_world(
+    hand: np.ndarray,
+    frames: OpenXrFrames,
+    angles: Array,
+    wrists: Array,
+    left: np.ndarray,
+    scale: float,
+    local: Array,
+    joints: Array,
+):
+    skeleton, positions, rotations, axes = unpack_skeleton(hand), _positions(), _rotations(), _axes()
     quats, turned, point = _quats(), _quat(), vector()
     for n in range(len(angles)):
-        forward_kinematics_into(angles[n], positions, rotations, axes)
-        for bone in range(BONE_COUNT):
-            _quat_into(rotations[bone], left[n], quats[bone])
-            _multiply(quats[max(PARENTS[bone], 0)], -1.0, quats[bone], local[n, bone])
+        forward_kinematics_into(skeleton, angles[n], positions, rotations, axes)
+        for bone in range(len(skeleton.rest)):
+            matrix_to_quat_into(rotations[bone], left[n], quats[bone])
+            multiply_quats_into(quats[max(skeleton.parents[bone], 0)], -1.0, quats[bone], local[n, bone])
         wrist, own = wrists[n], joints[n]
-        for i in range(len(_JOINTS)):
+        for i in range(len(frames.joints)):
             for k in range(3):
-                p = positions[_JOINTS[i], k]
-                if _KNUCKLE_AFTER[i] > 0:
-                    p = _METACARPAL_BASE * positions[_KNUCKLE_AFTER[i], k]
-                if i == 0:
-                    p = 0.5 * (1.0 + _METACARPAL_BASE) * positions[_MIDDLE_KNUCKLE, k]
+                p = frames.shares[i] * positions[frames.joints[i], k]
                 point[k] = scale * (-p if left[n] and k == 0 else p)
-            _rotate(wrist[3:], point, own[i, :3])
+            quat_rotate_into(wrist[3:], point, own[i, :3])
             for k in range(3):
                 own[i, k] += wrist[k]
-            _multiply(quats[_BONES[i]], 1.0, offsets[1 if left[n] else 0, i], turned)
-            _multiply(wrist[3:], 1.0, turned, own[i, 3:])
+            multiply_quats_into(quats[frames.bones[i]], 1.0, frames.offsets[1 if left[n] else 0, i], turned)
+            multiply_quats_into(wrist[3:], 1.0, turned, own[i, 3:])
 
 
-@cache
-def _flat_hand_offsets() -> Array:
-    """For each OpenXR joint its frame in that of the bone it follows, on a flat right and left hand, `(2, 26, 4)`."""
-    positions, matrices = forward_kinematics(np.zeros(DOF_COUNT))
+@lru_cache(_HANDS_KEPT)
+def openxr_frames(hand: Hand) -> OpenXrFrames:
+    """The frames of the OpenXR joints on a hand whose joints messages can carry (`wire.hand_names`)."""
+    thumb, *fingers = hand.fingers
+    middle_knuckle = fingers[1][0]
+    # the thumb's metacarpal is its second bone, which both carpal angles have turned
+    thumb_places = [(joint, 1.0, joint) for joint in thumb[1:]]
+    places = [(middle_knuckle, 0.5 * (1.0 + METACARPAL_BASE), 0), (0, 1.0, 0), *thumb_places]
+    for knuckle, *beyond in fingers:
+        places += [(knuckle, METACARPAL_BASE, 0), *((joint, 1.0, joint) for joint in (knuckle, *beyond))]
+    joints, shares, ends = (np.array(column) for column in zip(*places, strict=True))
+    bones = np.where(ends < hand.bone_count, ends, hand.parents[ends])
+    right = _bone_frames(hand)[bones]
+    return OpenXrFrames(joints, shares, bones, np.stack([right, mirror_quats(right)]))
+
+
+def _bone_frames(hand: Hand) -> Array:
+    """For each bone the OpenXR frame in its own on the flat hand, `(B, 4)`."""
+    positions, matrices = forward_kinematics(hand, np.zeros(hand.angle_count))
     hinges = {
-        bone: matrices[PARENTS[bone]] @ axis
-        for name, bone, axis in zip(DOF_NAMES, DOF_JOINTS.tolist(), DOF_AXES, strict=True)
+        bone: matrices[hand.parents[bone]] @ axis
+        for name, bone, axis in zip(hand.angle_names, hand.angle_bones.tolist(), hand.axes, strict=True)
         if name.endswith("_FE")
     }
-    hinges[2] = hinges[3]  # the first carpal hinge rolls the thumb more than it bends it
-    frames = np.empty((BONE_COUNT, 3, 3))
-    frames[:2] = _frame(along=np.array([1.0, 0.0, 0.0]), hinge=np.array([0.0, 1.0, 0.0]))
-    for bone in range(2, BONE_COUNT):
-        child = PARENTS.tolist().index(bone)
-        frames[bone] = _frame(positions[child] - positions[bone], hinges[bone])
-    right = matrix_to_quat(np.swapaxes(matrices, 1, 2) @ frames)[_BONES]
-    return np.stack([right, mirror_quats(right)])
+    thumb = hand.fingers[0]
+    hinges[thumb[1]] = hinges[thumb[2]]  # the first carpal hinge rolls the thumb more than it bends it
+    frames = np.empty((hand.bone_count, 3, 3))
+    frames[0] = frames[thumb[0]] = _frame(along=np.array([1.0, 0.0, 0.0]), hinge=np.array([0.0, 1.0, 0.0]))
+    for bone in range(1, hand.bone_count):
+        if bone != thumb[0]:
+            child = hand.parents.tolist().index(bone)
+            frames[bone] = _frame(positions[child] - positions[bone], hinges[bone])
+    return matrix_to_quat(np.swapaxes(matrices, 1, 2) @ frames)
 
 
 def _frame(along: Array, hinge: Array) -> Array:
-    """Columns x, y, z of a bone pointing `along` that flexes about `hinge`, toward the palm."""
+    """Columns x, y, z of a bone that points `along` and flexes about `hinge`, toward the palm."""
     z, y = -along, np.cross(along, hinge)
     columns = np.stack([np.cross(y, z), y, z], axis=1)
     return columns / np.linalg.norm(columns, axis=0)

@@ -1,51 +1,101 @@
-"""Inverse kinematics of one hand at one tick: targets, a solver, and corrections that fade in and out."""
+"""Inverse kinematics of one hand at one tick: targets, a solver, and corrections that fade in and out.
 
+Each `correct_…` here is the step of a solver in `solvers.SOLVERS`: it writes the `angles (A,)` that meet the contacts
+of a `Problem`, and updates the `correction (A,)` that is carried from tick to tick.
+"""
+
+from typing import NamedTuple
+
+from manipnet.geometry import Array
 from manipnet.jit import inner, matrix, stack_array, vector
+from manipnet.synthesis.hand.hand import MAX_JOINTS, Chains, Skeleton
 from manipnet.synthesis.ik.ccd import solve_ccd
-from manipnet.synthesis.ik.chains import clamp
+from manipnet.synthesis.ik.chains import Surface, clamp
 from manipnet.synthesis.ik.grasp import grasp_confidence
 from manipnet.synthesis.ik.least_squares import solve_least_squares
 from manipnet.synthesis.ik.targets import place_targets
 from manipnet.synthesis.model.layout import PRESENT
+from manipnet.synthesis.objects.shape import Solid
 from manipnet.synthesis.sensing.scene import object_from_wrist
 
-_targets = stack_array(22, 3)
+_targets = stack_array(MAX_JOINTS, 3)
 FADE_SHARE = 0.6
-"""How much of the way to a new correction one tick goes: no popping."""
+"""Share of the way to a new correction that one tick goes, so that fingers do not pop."""
+
+
+class Problem(NamedTuple):
+    """One hand beside one object, and the pose that the network predicts for it."""
+
+    skeleton: Skeleton
+    chains: Chains
+    limits: Array
+    """`(A, 2)` radians."""
+    solid: Solid
+    wrist: Array
+    """`(21, 7)` window of the scene as the network sees it."""
+    other_wrist: Array
+    """`(21, 3)`"""
+    object: Array
+    """`(21, 7)`"""
+    mirrored: bool
+    scale: float
+    predicted: Array
+    """`(A,)` angles."""
+    positions: Array
+    """`(J, 3)` joints of the predicted pose."""
+    distances: Array
+    """`(J,)` from the joints to the surface as predicted, metres."""
 
 
 @inner
-def _fade(angles, predicted, correction, limits):
-    for dof in range(len(angles)):
-        correction[dof] += FADE_SHARE * (angles[dof] - predicted[dof] - correction[dof])
-        angles[dof] = clamp(predicted[dof] + correction[dof], limits, dof)
+def _place_surface(problem: Problem, rotation: Array, translation: Array, targets: Array):
+    """The object as the wrist sees it at the present, and `targets (J, 3)` of the joints."""
+    wrist, obj = problem.wrist[PRESENT], problem.object[PRESENT]
+    object_from_wrist(wrist, obj, problem.mirrored, rotation, translation)
+    place_targets(problem.solid, rotation, translation, problem.scale, problem.positions, problem.distances, targets)
+    return Surface(problem.solid.field, rotation, translation, problem.scale)
 
 
 @inner
-def correct_by_least_squares(
-    solid, wrist, other, obj, mirrored, scale, positions, distances, limits, predicted, angles, correction
-):
-    """From `predicted (20,)` angles to `angles (20,)` nearer to the contacts that the joint `positions (22, 3)` and
-    `distances (22,)` they were predicted with call for.
+def _fade(problem: Problem, angles: Array, correction: Array):
+    for angle in range(len(angles)):
+        correction[angle] += FADE_SHARE * (angles[angle] - problem.predicted[angle] - correction[angle])
+        angles[angle] = clamp(problem.predicted[angle] + correction[angle], problem.limits, angle)
 
-    `wrist`, `other (21, 3)` and `obj` are windows `(21, 7)` of the scene the network sees; `correction (20,)` is
-    carried from tick to tick, and the solver starts from it.
-    """
+
+@inner
+def correct_by_least_squares(problem: Problem, angles: Array, correction: Array):
+    """Damped least squares, which starts from the last tick's correction."""
     rotation, translation, targets = matrix(), vector(), _targets()
-    object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
-    place_targets(solid, rotation, translation, scale, positions, distances, targets)
-    hold = grasp_confidence(wrist, obj, other)
-    for dof in range(len(angles)):
-        angles[dof] = clamp(predicted[dof] + correction[dof], limits, dof)
-    solve_least_squares(predicted, targets, distances, hold, limits, solid.field, rotation, translation, scale, angles)
-    _fade(angles, predicted, correction, limits)
+    surface = _place_surface(problem, rotation, translation, targets)
+    confidence = grasp_confidence(problem.wrist, problem.object, problem.other_wrist)
+    for angle in range(len(angles)):
+        angles[angle] = clamp(problem.predicted[angle] + correction[angle], problem.limits, angle)
+    solve_least_squares(
+        problem.skeleton,
+        problem.chains,
+        problem.predicted,
+        targets,
+        problem.distances,
+        confidence,
+        problem.limits,
+        surface,
+        angles,
+    )
+    _fade(problem, angles, correction)
 
 
 @inner
-def correct_by_ccd(solid, wrist, obj, mirrored, scale, positions, distances, limits, predicted, angles, correction):
-    """The same with the paper's solver."""
+def correct_by_ccd(problem: Problem, angles: Array, correction: Array):
+    """The paper's solver."""
     rotation, translation, targets = matrix(), vector(), _targets()
-    object_from_wrist(wrist[PRESENT], obj[PRESENT], mirrored, rotation, translation)
-    place_targets(solid, rotation, translation, scale, positions, distances, targets)
-    solve_ccd(predicted, targets, limits, angles)
-    _fade(angles, predicted, correction, limits)
+    _place_surface(problem, rotation, translation, targets)
+    solve_ccd(problem.skeleton, problem.chains, problem.predicted, targets, problem.limits, angles)
+    _fade(problem, angles, correction)
+
+
+@inner
+def correct_nothing(problem: Problem, angles: Array, correction: Array):
+    """No inverse kinematics."""
+    for angle in range(len(angles)):
+        angles[angle] = problem.predicted[angle]

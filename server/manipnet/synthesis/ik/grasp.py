@@ -1,4 +1,4 @@
-"""Whether a hand holds the object, and with which fingers: what the network's distances alone do not settle.
+"""Whether a hand holds the object, and with which fingers: the network's distances alone do not settle it.
 
 An object that moves, and moves with the wrist, is held: on the published takes the captured hand touches it in 99.5 %
 of such frames. Then the thumb and whichever fingers are nearest belong on its surface.
@@ -6,32 +6,34 @@ of such frames. Then the thumb and whichever fingers are nearest belong on its s
 
 import numpy as np
 
+from manipnet.geometry import Array
 from manipnet.jit import inner, matrix, stack_array, vector
-from manipnet.synthesis.ik.chains import CAPSULE_ENDS, CAPSULE_RADII, CAPSULE_STARTS, CAPSULES, FINGERS
+from manipnet.synthesis.hand.hand import CHAIN_LENGTH, Chains
 from manipnet.synthesis.model.layout import PRESENT
-from manipnet.synthesis.sensing.scene import quat_to_matrix_into
+from manipnet.synthesis.rotations import quat_to_matrix_into
 
 ARM_M = 0.05
-"""Points this far from the object's origin are watched, so that turning counts as motion too."""
+"""Distance of the watched points from the object's origin, so that turning counts as motion too."""
 FIRST, LAST = 5, 16
 """Samples of the window that are looked at: a quarter of a second to either side."""
 STILL_M, MOVING_M = 0.004, 0.010
 """Motion of the object that does not count, and that counts in full."""
 TOGETHER, APART = 0.6, 1.0
-"""Its motion as the wrist sees it, over its motion: surely held, surely not."""
+"""The object's motion relative to the wrist over its motion in the world: surely held, surely not held."""
 HELPS_M, ALONE_M = 0.15, 0.25
-"""How far the other wrist is from the object where it may hold it, and where it surely does not."""
+"""Distance of the other wrist from the object at which it may hold it, and at which it surely does not."""
 TAKES_PART_M = 0.010
-"""A finger predicted to be this much farther from the object than the nearest one is left out of the grip."""
+"""A finger predicted to be this much farther from the object than the nearest one takes no part in the grasp."""
 _POINTS = 4
 _points = stack_array(_POINTS, 3)
 
 
 @inner
-def grasp_confidence(wrist, obj, other):
-    """How sure it is, 0 to 1, that the hand with poses `wrist (21, 7)` holds the object with poses `obj (21, 7)`.
+def grasp_confidence(wrist: Array, obj: Array, other: Array):
+    """How certain it is, 0 to 1, that the hand with poses `wrist (21, 7)` holds the object with poses `obj (21, 7)`.
 
-    What moves without it is in the `other (21, 3)` wrist's hand, or, where that one is far, in its fingers.
+    An object that moves without the wrist is in the hand of the `other (21, 3)` wrist or, where that one is far away,
+    in this hand's fingers.
     """
     w, o, apart, first, first_seen = matrix(), matrix(), vector(), _points(), _points()
     moved = seen_moved = 0.0
@@ -65,16 +67,20 @@ def grasp_confidence(wrist, obj, other):
 
 
 @inner
-def grip_into(distances, hold, grip):
-    """How much each finger takes part in a hold, `grip (5,)`: the thumb, and the fingers that predicted joint
-    `distances (22,)` bring nearest."""
-    nearest = np.inf
-    for finger in range(1, FINGERS):
-        grip[finger] = np.inf
-        for c in CAPSULES[finger]:
-            clearance = min(distances[CAPSULE_STARTS[c]], distances[CAPSULE_ENDS[c]]) - CAPSULE_RADII[c]
-            grip[finger] = min(grip[finger], max(clearance, 0.0))
-        nearest = min(nearest, grip[finger])
-    grip[0] = hold
-    for finger in range(1, FINGERS):
-        grip[finger] = hold * min(max(1.0 - (grip[finger] - nearest) / TAKES_PART_M, 0.0), 1.0)
+def finger_confidences_into(chains: Chains, distances: Array, confidence: float, out: Array):
+    """How certain it is that each finger takes part in a grasp that is certain with `confidence`, into `out (F,)`.
+
+    The thumb takes part, and so do the fingers that the predicted joint `distances (J,)` bring nearest.
+    """
+    fingers, nearest = len(chains.angles), np.inf
+    for finger in range(1, fingers):
+        out[finger] = np.inf
+        for k in range(CHAIN_LENGTH):
+            c = chains.capsules[finger, k]
+            if c >= 0:
+                clearance = min(distances[chains.starts[c]], distances[chains.ends[c]]) - chains.radii[c]
+                out[finger] = min(out[finger], max(clearance, 0.0))
+        nearest = min(nearest, out[finger])
+    out[0] = confidence
+    for finger in range(1, fingers):
+        out[finger] = confidence * min(max(1.0 - (out[finger] - nearest) / TAKES_PART_M, 0.0), 1.0)

@@ -3,136 +3,149 @@
 Each solver has a kernel of its own, so that only the one in use is compiled.
 """
 
-from typing import Literal, NamedTuple
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from types import FunctionType
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, stack_array
+from manipnet.synthesis.hand.hand import MAX_ANGLES, Hand, Indices, Skeleton
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
-from manipnet.synthesis.hand.skeleton import BONE_COUNT, DOF_COUNT, JOINT_COUNT
-from manipnet.synthesis.ik.correction import correct_by_ccd, correct_by_least_squares
-from manipnet.synthesis.model.decode import decode_into
+from manipnet.synthesis.hand.packed import unpack_chains, unpack_skeleton
+from manipnet.synthesis.ik.correction import Problem, correct_nothing
+from manipnet.synthesis.ik.solvers import solver_named
+from manipnet.synthesis.model.decode import decode_into, unpack_output_columns
+from manipnet.synthesis.model.features import Windows
+from manipnet.synthesis.model.layout import OutputColumns
+from manipnet.synthesis.objects.shape import Solid
 
-SolverName = Literal["least_squares", "ccd", "none"]
-SOLVERS: tuple[SolverName, ...] = ("least_squares", "ccd", "none")
 FEEDBACK_SHARE = 0.5
-"""How much of its corrections the network sees of its own hand: with all of them it strays from the poses it has
+"""Share of its corrections that the network sees of its own hand: with all of them it strays from the poses it has
 learned, with none it does not know what it holds (docs/results.md, Ideas tried)."""
+
+_axes, _angles = stack_array(MAX_ANGLES, 3), stack_array(MAX_ANGLES)
+_correct: Callable[..., Any] = correct_nothing
 
 
 class Poses(NamedTuple):
     """`N` hands at one tick, each in its own wrist frame as a right hand."""
 
     angles: Array
-    """`(N, 20)` radians."""
+    """`(N, A)` radians."""
     positions: Array
-    """`(N, 22, 3)` metres."""
+    """`(N, J, 3)` metres."""
     rotations: Array
-    """`(N, 17, 3, 3)`."""
+    """`(N, B, 3, 3)`."""
     correction: Array
-    """`(N, 20)` what inverse kinematics added to the network's angles, radians; before a tick, that of the last."""
+    """`(N, A)` what inverse kinematics added to the network's angles, radians; before a tick, the last tick's."""
     distances: Array
-    """`(N, 22)` joint to surface as predicted, metres, in [0, 0.035]."""
+    """`(N, J)` joint to surface as predicted, metres, in [0, 0.035]."""
     raw_positions: Array
-    """`(N, 22, 3)` before inverse kinematics."""
+    """`(N, J, 3)` before inverse kinematics."""
     feedback_angles: Array
-    """`(N, 20)` the hand as the network is to see it at the next tick, with `FEEDBACK_SHARE` of the correction."""
+    """`(N, A)` the hand as the network is to see it at the next tick, with `FEEDBACK_SHARE` of the correction."""
     feedback_positions: Array
     feedback_rotations: Array
 
 
-def allocate_poses(count: int) -> Poses:
-    """Poses of `count` hands, still to be filled in."""
+def allocate_poses(hand: Hand, count: int) -> Poses:
+    """Memory for the poses of `count` hands."""
+    angles, joints, bones = hand.angle_count, hand.joint_count, hand.bone_count
     return Poses(
-        np.empty((count, DOF_COUNT)),
-        np.empty((count, JOINT_COUNT, 3)),
-        np.empty((count, BONE_COUNT, 3, 3)),
-        np.empty((count, DOF_COUNT)),
-        np.empty((count, JOINT_COUNT)),
-        np.empty((count, JOINT_COUNT, 3)),
-        np.empty((count, DOF_COUNT)),
-        np.empty((count, JOINT_COUNT, 3)),
-        np.empty((count, BONE_COUNT, 3, 3)),
+        np.empty((count, angles)),
+        np.empty((count, joints, 3)),
+        np.empty((count, bones, 3, 3)),
+        np.empty((count, angles)),
+        np.empty((count, joints)),
+        np.empty((count, joints, 3)),
+        np.empty((count, angles)),
+        np.empty((count, joints, 3)),
+        np.empty((count, bones, 3, 3)),
     )
 
 
-_axes, _angles = stack_array(DOF_COUNT, 3), stack_array(DOF_COUNT)
+@inner
+def _predict(
+    skeleton: Skeleton,
+    columns: OutputColumns,
+    output: Array,
+    before: Array,
+    response: float,
+    limits: Array,
+    axes: Array,
+    n: int,
+    poses: Poses,
+    predicted: Array,
+):
+    """The network's own pose of hand `n`: its angles into `predicted (A,)`, raw positions and distances."""
+    decode_into(skeleton, columns, output, before, response, limits, poses.rotations[n], predicted, poses.distances[n])
+    forward_kinematics_into(skeleton, predicted, poses.raw_positions[n], poses.rotations[n], axes)
 
 
 @inner
-def _predict(output, before, response, limits, axes, n, poses, predicted):
-    """What the network alone says of hand `n`: its angles into `predicted (20,)`, raw positions and distances."""
-    decode_into(output, before, response, limits, poses.rotations[n], predicted, poses.distances[n])
-    forward_kinematics_into(predicted, poses.raw_positions[n], poses.rotations[n], axes)
-
-
-@inner
-def _settle(predicted, axes, n, poses):
+def _settle(skeleton: Skeleton, predicted: Array, axes: Array, n: int, poses: Poses):
     """Joints of hand `n` from its corrected angles, and the hand as the network is to see it."""
     angles, feedback = poses.angles[n], poses.feedback_angles[n]
-    forward_kinematics_into(angles, poses.positions[n], poses.rotations[n], axes)
-    for dof in range(DOF_COUNT):
-        feedback[dof] = predicted[dof] + FEEDBACK_SHARE * (angles[dof] - predicted[dof])
-    forward_kinematics_into(feedback, poses.feedback_positions[n], poses.feedback_rotations[n], axes)
+    forward_kinematics_into(skeleton, angles, poses.positions[n], poses.rotations[n], axes)
+    for angle in range(len(angles)):
+        feedback[angle] = predicted[angle] + FEEDBACK_SHARE * (angles[angle] - predicted[angle])
+    forward_kinematics_into(skeleton, feedback, poses.feedback_positions[n], poses.feedback_rotations[n], axes)
 
 
-@kernel
-def pose_by_least_squares(solid, windows, outputs, before, response, limits, first, last, poses):
-    """Pose hands `first … last - 1`, all about `solid`, as the network's `outputs (N, 220)` and the angles
-    `before (N, 20)` of the last tick say."""
+def _pose(
+    hand: np.ndarray,
+    starts: Indices,
+    solid: Solid,
+    windows: Windows,
+    outputs: np.ndarray,
+    before: Array,
+    response: float,
+    limits: Array,
+    first: int,
+    last: int,
+    poses: Poses,
+):
+    """Pose hands `first … last - 1`, all about `solid`, from the network's `outputs (N, output_size)` and the angles
+    `before (N, A)` of the last tick."""
+    skeleton, chains, columns = unpack_skeleton(hand), unpack_chains(hand), unpack_output_columns(starts)
     axes, predicted = _axes(), _angles()
     for n in range(first, last):
-        angles = poses.angles[n]
-        _predict(outputs[n], before[n], response, limits, axes, n, poses, predicted)
-        correct_by_least_squares(
+        _predict(skeleton, columns, outputs[n], before[n], response, limits, axes, n, poses, predicted)
+        problem = Problem(
+            skeleton,
+            chains,
+            limits,
             solid,
             windows.wrist[n],
             windows.other_wrist[n],
             windows.object[n],
             windows.mirrored[n],
             windows.scale[n],
+            predicted,
             poses.raw_positions[n],
             poses.distances[n],
-            limits,
-            predicted,
-            angles,
-            poses.correction[n],
         )
-        _settle(predicted, axes, n, poses)
+        _correct(problem, poses.angles[n], poses.correction[n])
+        _settle(skeleton, predicted, axes, n, poses)
 
 
-@kernel
-def pose_by_ccd(solid, windows, outputs, before, response, limits, first, last, poses):
-    """The same with the paper's solver."""
-    axes, predicted = _axes(), _angles()
-    for n in range(first, last):
-        angles = poses.angles[n]
-        _predict(outputs[n], before[n], response, limits, axes, n, poses, predicted)
-        correct_by_ccd(
-            solid,
-            windows.wrist[n],
-            windows.object[n],
-            windows.mirrored[n],
-            windows.scale[n],
-            poses.raw_positions[n],
-            poses.distances[n],
-            limits,
-            predicted,
-            angles,
-            poses.correction[n],
-        )
-        _settle(predicted, axes, n, poses)
+def make_pose_kernel(correct: Callable[..., Any], name: str) -> Callable[..., None]:
+    """`_pose` compiled with the step `correct`, under a name of its own in the cache on disk.
+
+    The step is a global of the compiled function, because Numba cannot find a closure over a compiled function again:
+    it files one by a number that is new in every process.
+    """
+    function = FunctionType(_pose.__code__, {**globals(), "_correct": correct}, name)
+    function.__qualname__, function.__module__ = name, __name__
+    return kernel(function)
 
 
-@kernel
-def pose_as_predicted(solid, windows, outputs, before, response, limits, first, last, poses):
-    """The same without inverse kinematics."""
-    axes = _axes()
-    for n in range(first, last):
-        _predict(outputs[n], before[n], response, limits, axes, n, poses, poses.angles[n])
-        _settle(poses.angles[n], axes, n, poses)
-
-
-POSERS = {"least_squares": pose_by_least_squares, "ccd": pose_by_ccd, "none": pose_as_predicted}
-"""The kernel of each solver."""
+@cache
+def pose_kernel(solver: str) -> Callable[..., None]:
+    """The kernel of a solver in `solvers.SOLVERS`, compiled when it is first called. Raises `ValueError`."""
+    module, _, function = solver_named(solver).correct.partition(":")
+    return make_pose_kernel(getattr(import_module(module), function), f"pose_by_{solver}")

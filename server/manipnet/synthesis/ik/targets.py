@@ -1,7 +1,9 @@
 """Where the joints should go: the network's positions corrected by its distances (paper, appendix B, algorithm 1)."""
 
+from manipnet.geometry import Array
 from manipnet.jit import inner
 from manipnet.synthesis.objects.distance_field import signed_distance
+from manipnet.synthesis.objects.shape import Solid
 from manipnet.synthesis.sensing.scene import map_direction_back, map_point
 
 NEAR_M = 0.028
@@ -9,16 +11,24 @@ NEAR_M = 0.028
 
 
 @inner
-def mix_distances(predicted, measured):
-    """Final distance of a joint: trust the prediction when the position is inside the object, else the position."""
+def mix_distances(predicted: float, measured: float):
+    """Final distance of a joint: mostly the predicted one where the joint is inside the object, else the measured."""
     if measured < 0.0:
         return 0.8 * predicted + 0.2 * measured
     return 0.2 * predicted + 0.8 * measured
 
 
 @inner
-def place_targets(solid, rotation, translation, scale, positions, distances, targets):
-    """Targets `(22, 3)` in the wrist frame from predicted joint `positions (22, 3)` and `distances (22,)`, metres."""
+def place_targets(
+    solid: Solid,
+    rotation: Array,
+    translation: Array,
+    scale: float,
+    positions: Array,
+    distances: Array,
+    targets: Array,
+):
+    """Targets `(J, 3)` in the wrist frame from predicted joint `positions (J, 3)` and `distances (J,)`, metres."""
     for j in range(len(positions)):
         for i in range(3):
             targets[j, i] = positions[j, i]

@@ -1,4 +1,8 @@
-"""A model bundle: `manipnet.onnx` with its normalisation inside, `bundle.json` that says what it expects, `CARD.md`."""
+"""A model bundle: a folder with a trained network and the hand it was trained for.
+
+`manipnet.onnx` is the network with its normalisation inside, `bundle.json` says what it expects, `hand.npz` is the
+hand, `CARD.md` is for people.
+"""
 
 import hashlib
 import json
@@ -11,11 +15,15 @@ import numpy as np
 import onnxruntime
 
 from manipnet.geometry import Array
-from manipnet.synthesis.hand.skeleton import DOF_COUNT, DOF_NAMES
-from manipnet.synthesis.model.layout import INPUT_SIZE, OUTPUT_SIZE, describe
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.hand_file import HAND_FILE, read_hand
+from manipnet.synthesis.hand.validation import HandError
+from manipnet.synthesis.model.layout import Layout, layout_of
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, Provider
+from manipnet.synthesis.model.shipped import models_folder, shipped_models
+from manipnet.wire.hand_names import misfit
 
-FORMAT = 1
+FORMAT = 2
 
 _CPU, _CUDA = "CPUExecutionProvider", "CUDAExecutionProvider"
 _log = logging.getLogger(__name__)
@@ -30,47 +38,41 @@ class Bundle:
     """A trained model, ready to run."""
 
     name: str
+    hand: Hand
+    """The hand that the network poses."""
+    layout: Layout
+    """Of the network's inputs and outputs."""
     rest_angles: Array
-    """`(20,)` neutral pose, radians."""
+    """`(A,)` neutral pose, radians."""
     limits: Array
-    """`(20, 2)` limits of the angles, radians."""
+    """`(A, 2)` limits of the angles in the poses it was trained on, radians."""
     response: float
     """Share of the way to the network's pose that a hand goes in one tick, in (0, 1]; its poses lead by that lag."""
     meta: dict[str, Any]
+    """The content of `bundle.json`."""
     model_hash: str
     session: onnxruntime.InferenceSession
     folder: Path
 
     @property
     def provider(self) -> Provider:
-        """What it runs on: `cpu` or `cuda`."""
+        """What it runs on, `cpu` or `cuda`."""
         return "cuda" if self.session.get_providers()[0] == _CUDA else "cpu"
 
     def infer(self, rows: np.ndarray) -> np.ndarray:
-        """Network outputs `(N, 220)` of feature rows `(N, 2356)` float32, both in SI units."""
+        """Network outputs `(N, output_size)` of feature rows `(N, input_size)` float32, both in SI units."""
         return np.asarray(self.session.run(None, {"features": rows})[0])
 
 
-def models_folder() -> Path:
-    """Where the shipped bundles are: inside an installed package, or at the top of a checkout."""
-    package = Path(__file__).resolve().parents[2]
-    installed = package / "models"
-    return installed if installed.is_dir() else package.parents[1] / "models"
-
-
 def load_bundle(model: Path | str = DEFAULT_MODEL, provider: Provider = "cpu") -> Bundle:
-    """Load a bundle by folder or by the name of a shipped one. Raises `BundleError`.
+    """Load a bundle by its folder or by the name of a shipped one. Raises `BundleError`.
 
-    Where a GPU was asked for or is expected and cannot be had, a line of the log says why, and it runs on the
-    processor.
+    If a GPU was requested and cannot be used, a line of the log says why and the network runs on the processor.
     """
-    folder = Path(model)
-    if not folder.is_dir():
-        folder = models_folder() / str(model)
-    if not folder.is_dir():
-        shipped = sorted(path.name for path in models_folder().glob("*") if (path / "bundle.json").is_file())
-        raise BundleError(f"model {str(model)!r} is no folder and no shipped bundle; shipped are {', '.join(shipped)}")
-    meta = _read_meta(folder / "bundle.json")
+    folder = _find(model)
+    hand = _read_hand(folder / HAND_FILE)
+    layout = layout_of(hand)
+    meta = _read_meta(folder / "bundle.json", hand, layout)
     path = folder / "manipnet.onnx"
     try:
         content = path.read_bytes()
@@ -79,33 +81,44 @@ def load_bundle(model: Path | str = DEFAULT_MODEL, provider: Provider = "cpu") -
     model_hash = hashlib.sha256(content).hexdigest()
     if meta.get("model_sha256") != model_hash:
         raise BundleError(f"{path}: its hash is not the one in bundle.json; the bundle is damaged, copy it again")
-    session = open_session(path, content, provider)
-    return Bundle(folder.name, *_read_pose(folder, meta), meta, model_hash, session, folder)
+    session = open_session(path, content, layout, provider)
+    return Bundle(folder.name, hand, layout, *_read_pose(folder, meta, hand), meta, model_hash, session, folder)
 
 
-def open_session(path: Path | str, content: bytes, provider: Provider = "cpu") -> onnxruntime.InferenceSession:
-    """A graph on one thread; raises `BundleError`, naming `path`, for one that is not of the feature layout."""
+def _find(model: Path | str) -> Path:
+    folder = Path(model) if Path(model).is_dir() else models_folder() / str(model)
+    if not folder.is_dir():
+        shipped = ", ".join(shipped_models())
+        raise BundleError(f"model {str(model)!r} is neither a folder nor a shipped bundle; shipped are {shipped}")
+    return folder
+
+
+def open_session(
+    path: Path | str, content: bytes, layout: Layout, provider: Provider = "cpu"
+) -> onnxruntime.InferenceSession:
+    """Open a graph on one thread. Raises `BundleError`, which names `path`, for one that does not fit the layout."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3
     providers = _providers(provider)
     try:
         session = onnxruntime.InferenceSession(content, options, providers=providers)
-    except Exception as error:  # the runtime raises its own zoo of exceptions for a bad graph
+    except Exception as error:  # the runtime raises many kinds of its own for a bad graph
         raise BundleError(f"{path}: not a model this runtime can open ({error})") from None
     if session.get_providers()[0] != providers[0]:
         _log.warning("CUDA could not be started (driver or CUDA libraries missing); the network runs on the processor")
     sizes = [node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())]
-    if sizes != [INPUT_SIZE, OUTPUT_SIZE]:
-        raise BundleError(f"{path}: takes and gives {sizes} numbers; expected are {[INPUT_SIZE, OUTPUT_SIZE]}")
+    expected = [layout.input_size, layout.output_size]
+    if sizes != expected:
+        raise BundleError(f"{path}: takes and gives {sizes} numbers; expected are {expected}")
     return session
 
 
-def _providers(asked: Provider) -> list[str]:
+def _providers(requested: Provider) -> list[str]:
     """ONNX Runtime's names, the preferred one first."""
-    if asked != "cpu" and _CUDA in onnxruntime.get_available_providers():
+    if requested != "cpu" and _CUDA in onnxruntime.get_available_providers():
         return [_CUDA, _CPU]
-    if asked == "cuda":
+    if requested == "cuda":
         _log.warning(
             "the provider cuda is not installed (python -m pip install 'manipnet-live[gpu]'); the network runs on the "
             "processor"
@@ -113,7 +126,17 @@ def _providers(asked: Provider) -> list[str]:
     return [_CPU]
 
 
-def _read_meta(path: Path) -> dict[str, Any]:
+def _read_hand(path: Path) -> Hand:
+    try:
+        hand = read_hand(path)
+    except HandError as error:
+        raise BundleError(str(error)) from None
+    if reason := misfit(hand.joint_names, hand.angle_names):
+        raise BundleError(f"{path}: the hand {hand.name!r} does not fit the hands messages: {reason}")
+    return hand
+
+
+def _read_meta(path: Path, hand: Hand, layout: Layout) -> dict[str, Any]:
     try:
         meta = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -123,25 +146,26 @@ def _read_meta(path: Path) -> dict[str, Any]:
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         found = meta.get("format") if isinstance(meta, dict) else None
         raise BundleError(f"{path}: bundle format {found!r}, this version reads {FORMAT}; train or download it again")
-    if meta.get("layout") != describe():
+    if meta.get("layout") != layout.describe():
         raise BundleError(f"{path}: trained for another feature layout than this version's; train it again")
-    if meta.get("dofs") != list(DOF_NAMES):
-        raise BundleError(f"{path}: trained for another hand; expected angles are {', '.join(DOF_NAMES)}")
+    if meta.get("angle_names") != list(hand.angle_names):
+        raise BundleError(f"{path}: trained for another hand; {HAND_FILE} has the angles {', '.join(hand.angle_names)}")
     return meta
 
 
-def _read_pose(folder: Path, meta: dict[str, Any]) -> tuple[Array, Array, float]:
+def _read_pose(folder: Path, meta: dict[str, Any], hand: Hand) -> tuple[Array, Array, float]:
+    path, count = folder / "bundle.json", hand.angle_count
     try:
         rest = np.array(meta["rest_angles_rad"], dtype=np.float64)
         limits = np.array(meta["limits_rad"], dtype=np.float64)
         response = float(meta["response"])
     except (KeyError, TypeError, ValueError):
         raise BundleError(
-            f"{folder / 'bundle.json'}: needs rest_angles_rad (20,), limits_rad (20, 2) and response"
+            f"{path}: needs rest_angles_rad ({count},), limits_rad ({count}, 2) and response, all of them numbers"
         ) from None
-    good = rest.shape == (DOF_COUNT,) and limits.shape == (DOF_COUNT, 2)
+    good = rest.shape == (count,) and limits.shape == (count, 2)
     if not (good and np.all(limits[:, 0] <= rest) and np.all(rest <= limits[:, 1])):
-        raise BundleError(f"{folder / 'bundle.json'}: rest_angles_rad (20,) must be inside limits_rad (20, 2)")
+        raise BundleError(f"{path}: rest_angles_rad ({count},) must be inside limits_rad ({count}, 2)")
     if not 0.0 < response <= 1.0:
-        raise BundleError(f"{folder / 'bundle.json'}: response is {response}, allowed is above 0 up to 1")
+        raise BundleError(f"{path}: response is {response}; it must be above 0 and at most 1")
     return rest, limits, response

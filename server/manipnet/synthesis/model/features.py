@@ -1,7 +1,7 @@
-"""Features of one tick: the network's 2356 inputs for any number of hands, the same in training and live.
+"""Features of one tick: the network's inputs for any number of hands, the same in training and live.
 
-Hands come as arrays in the scene the network sees, in which every hand is a right hand: a left hand's window is
-mirrored before (`mirrored` says so, because then the object's own geometry must be mirrored too).
+Hands come as arrays in the scene that the network sees, in which every hand is a right hand. A left hand's window is
+mirrored before; `mirrored` says so, because the object's own geometry must then be mirrored too.
 """
 
 from typing import NamedTuple
@@ -10,39 +10,29 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, matrix, stack_array, vector
+from manipnet.synthesis.hand.hand import MAX_JOINTS, MAX_SENSORS, Hand, Indices
+from manipnet.synthesis.hand.packed import unpack_sensors, unpack_skeleton
 from manipnet.synthesis.model.layout import (
-    INPUT,
-    INPUT_SIZE,
-    OUTPUT,
+    AMBIENT_CELLS,
     OUTPUT_DISTANCE_MAX_M,
-    OUTPUT_SIZE,
     PRESENT,
     SENSED,
+    WINDOW,
     WINDOW_STEP_S,
+    InputColumns,
+    Layout,
+    layout_of,
 )
-from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.objects.shape import Shape, Solid
+from manipnet.synthesis.rotations import quat_to_matrix_into, rotation_vector_into
 from manipnet.synthesis.sensing.ambient import sense_ambient
 from manipnet.synthesis.sensing.distance import sense_distances
-from manipnet.synthesis.sensing.proximity import (
-    SENSOR_COUNT,
-    SENSORS,
-    Rays,
-    aim_rays,
-    allocate_rays,
-    place_sensors,
-    read_rays,
-)
-from manipnet.synthesis.sensing.scene import object_from_wrist, quat_to_matrix_into
+from manipnet.synthesis.sensing.proximity import Rays, aim_rays, allocate_rays, place_sensors, read_rays
+from manipnet.synthesis.sensing.scene import object_from_wrist
 
-_POSITIONS, _AXES = INPUT["joint_positions"].start, INPUT["joint_axes"].start
-_WRIST_POSITIONS, _WRIST_AXES = INPUT["wrist_positions"].start, INPUT["wrist_axes"].start
-_OTHER, _CENTERS = INPUT["other_wrist_distances"].start, INPUT["object_centers"].start
-_SPINS, _AMBIENT = INPUT["object_angular_velocities"].start, INPUT["ambient"].start
-_PROXIMITY = INPUT["proximity"].start
-_DISTANCES, _NORMALS = INPUT["signed_distances"].start, INPUT["surface_normals"].start
-_OUT_AXES, _OUT_DISTANCES = OUTPUT["joint_axes"].start, OUTPUT["distances"].start
-_WINDOW, _SENSED_COUNT = 21, len(SENSED)
-_joint_numbers, _joint_vectors, _sensor_vectors = stack_array(22), stack_array(22, 3), stack_array(SENSOR_COUNT, 3)
+_SENSED_COUNT = len(SENSED)
+_joint_numbers, _joint_vectors = stack_array(MAX_JOINTS), stack_array(MAX_JOINTS, 3)
+_sensor_vectors = stack_array(MAX_SENSORS, 3)
 
 
 class Windows(NamedTuple):
@@ -60,21 +50,25 @@ class Windows(NamedTuple):
     """`(N,)` scale of the object."""
 
 
-RAYS_PER_HAND = _SENSED_COUNT * SENSOR_COUNT
+def rays_of(hand: Hand, count: int) -> Rays:
+    """Memory for the rays of `count` hands: all their sensors' at every instant that is sensed, and one more."""
+    return allocate_rays(count * _SENSED_COUNT * hand.sensor_count + 1)
 
 
-def features(shape: Shape, windows: Windows, positions: Array, rotations: Array) -> np.ndarray:
-    """Network inputs `(N, 2356)` float32 of hands that all face `shape`.
+def features(hand: Hand, shape: Shape, windows: Windows, positions: Array, rotations: Array) -> np.ndarray:
+    """Network inputs `(N, input_size)` float32 of hands that all face `shape`.
 
-    `positions (N, 22, 3)` and `rotations (N, 17, 3, 3)` are the present poses in the wrist frame.
+    `positions (N, J, 3)` and `rotations (N, B, 3, 3)` are the present poses in the wrist frame.
     """
-    count = len(positions)
-    rows = np.empty((count, INPUT_SIZE), np.float32)
-    sense(shape, windows, positions, rotations, 0, count, allocate_rays(count * RAYS_PER_HAND + 1), rows)
+    count, layout = len(positions), layout_of(hand)
+    rows = np.empty((count, layout.input_size), np.float32)
+    sense(hand, layout, shape, windows, positions, rotations, 0, count, rays_of(hand, count), rows)
     return rows
 
 
 def sense(
+    hand: Hand,
+    layout: Layout,
     shape: Shape,
     windows: Windows,
     positions: Array,
@@ -84,31 +78,43 @@ def sense(
     rays: Rays,
     rows: np.ndarray,
 ) -> None:
-    """Features of the hands `first … last - 1`, which all face `shape`, into those `rows (N, 2356)` of `N` hands.
+    """Features of the hands `first … last - 1`, which all face `shape`, into those `rows (N, input_size)`.
 
-    `rays` is room for one ray more than `RAYS_PER_HAND` of each of them.
+    `rays` has room for all of them (`rays_of`).
     """
-    traced = _all_but_readings(SENSORS, shape.solid, windows, positions, rotations, first, last, rays, rows)
+    traced = _all_but_readings(
+        hand.packed,
+        layout.input_starts,
+        shape.solid,
+        windows,
+        positions,
+        rotations,
+        first,
+        last,
+        rays,
+        rows,
+    )
     read_rays(shape.rays, rays, traced, windows.scale, rows)
 
 
-def pose_outputs(positions: Array, rotations: Array, distances: Array) -> np.ndarray:
-    """Network outputs `(N, 220)` float32 that say a pose and its signed joint distances `(N, 22)`."""
-    rows = np.empty((len(positions), OUTPUT_SIZE), np.float32)
-    _all_pose_rows(positions, rotations, rows)
-    rows[:, OUTPUT["distances"].columns] = np.clip(distances, 0.0, OUTPUT_DISTANCE_MAX_M)
+def pose_outputs(hand: Hand, positions: Array, rotations: Array, distances: Array) -> np.ndarray:
+    """Network outputs `(N, output_size)` float32 that mean a pose and its signed joint distances `(N, J)`."""
+    layout = layout_of(hand)
+    rows = np.empty((len(positions), layout.output_size), np.float32)
+    _all_pose_rows(hand.parents, layout.output["joint_axes"].start, positions, rotations, rows)
+    rows[:, layout.output["distances"].columns] = np.clip(distances, 0.0, OUTPUT_DISTANCE_MAX_M)
     return rows
 
 
 def joint_distances(shape: Shape, windows: Windows, positions: Array) -> Array:
-    """Signed distances `(N, 22)` of joints at the present tick, metres, clamped at +10 cm."""
-    distances = np.empty((len(positions), 22))
+    """Signed distances `(N, J)` of joints at the present tick, metres, clamped at +10 cm."""
+    distances = np.empty(positions.shape[:2])
     _present_distances(shape.solid, windows, positions, distances)
     return distances
 
 
 @kernel
-def _present_distances(solid, windows, positions, distances):
+def _present_distances(solid: Solid, windows: Windows, positions: Array, distances: Array):
     rotation, translation, normals = matrix(), vector(), _joint_vectors()
     for n in range(len(positions)):
         object_from_wrist(
@@ -118,39 +124,47 @@ def _present_distances(solid, windows, positions, distances):
 
 
 @inner
-def _pose_rows(positions, rotations, first, last, rows):
-    """Joint positions and the first two axes of every bone, tips carrying their parent's."""
+def _pose_rows(
+    parents: Indices, axes_column: int, positions: Array, rotations: Array, first: int, last: int, rows: np.ndarray
+):
+    """Joint positions and the first two axes of every bone; tips carry their parent's."""
+    bones = rotations.shape[1]
     for n in range(first, last):
-        for j in range(22):
-            # the tips follow joints 4, 7, 10, 13, 16
-            bone = j if j < 17 else 3 * (j - 17) + 4
+        for j in range(len(parents)):
+            bone = j if j < bones else parents[j]
             for i in range(3):
                 rows[n, 3 * j + i] = positions[n, j, i]
-                rows[n, _OUT_AXES + 6 * j + i] = rotations[n, bone, i, 0]
-                rows[n, _OUT_AXES + 6 * j + 3 + i] = rotations[n, bone, i, 1]
+                rows[n, axes_column + 6 * j + i] = rotations[n, bone, i, 0]
+                rows[n, axes_column + 6 * j + 3 + i] = rotations[n, bone, i, 1]
 
 
 @kernel
-def _all_pose_rows(positions, rotations, rows):
-    _pose_rows(positions, rotations, 0, len(rows), rows)
+def _all_pose_rows(parents: Indices, axes_column: int, positions: Array, rotations: Array, rows: np.ndarray):
+    _pose_rows(parents, axes_column, positions, rotations, 0, len(rows), rows)
 
 
 @inner
-def _rotation_vector_into(m, out):
-    """Logarithm of a rotation matrix by way of its quaternion's vector part; exact for the small turns of a window."""
-    x, y, z = 0.5 * (m[2, 1] - m[1, 2]), 0.5 * (m[0, 2] - m[2, 0]), 0.5 * (m[1, 0] - m[0, 1])
-    sine = np.sqrt(x * x + y * y + z * z)
-    angle = np.arctan2(sine, 0.5 * (m[0, 0] + m[1, 1] + m[2, 2] - 1.0))
-    factor = 1.0 if sine < 1e-9 else angle / sine
-    out[0], out[1], out[2] = factor * x, factor * y, factor * z
+def _unpack_columns(starts: Indices):
+    """The first columns of the input blocks, from `Layout.input_starts`."""
+    s = starts
+    return InputColumns(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10])
 
 
 @inner
-def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
+def _trajectory_row(
+    columns: InputColumns,
+    wrist: Array,
+    other: Array,
+    obj: Array,
+    mirrored: bool,
+    scale: float,
+    center_of_mass: Array,
+    row: np.ndarray,
+):
     w0, w, o, before, turn, spin, center = matrix(), matrix(), matrix(), matrix(), matrix(), vector(), vector()
     quat_to_matrix_into(wrist[PRESENT, 3:], w0)
     origin = wrist[PRESENT]
-    for t in range(_WINDOW):
+    for t in range(WINDOW):
         quat_to_matrix_into(wrist[t, 3:], w)
         for i in range(3):
             for j in range(3):
@@ -166,7 +180,7 @@ def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
             for i in range(3):
                 for j in range(3):
                     turn[i, j] = o[i, 0] * before[j, 0] + o[i, 1] * before[j, 1] + o[i, 2] * before[j, 2]
-            _rotation_vector_into(turn, spin)
+            rotation_vector_into(turn, spin)
         apart = 0.0
         for i in range(3):
             p = c = v = x = y = 0.0
@@ -176,42 +190,58 @@ def _trajectory_row(wrist, other, obj, mirrored, scale, center_of_mass, row):
                 v += w0[k, i] * spin[k]
                 x += w0[k, i] * w[k, 0]
                 y += w0[k, i] * w[k, 1]
-            row[_WRIST_POSITIONS + 3 * t + i] = p
-            row[_WRIST_AXES + 6 * t + i] = x
-            row[_WRIST_AXES + 6 * t + 3 + i] = y
-            row[_CENTERS + 3 * t + i] = c
+            row[columns.wrist_positions + 3 * t + i] = p
+            row[columns.wrist_axes + 6 * t + i] = x
+            row[columns.wrist_axes + 6 * t + 3 + i] = y
+            row[columns.object_centers + 3 * t + i] = c
             apart += (other[t, i] - origin[i]) ** 2
             if t > 0:
-                row[_SPINS + 3 * t + i] = v / WINDOW_STEP_S
+                row[columns.object_angular_velocities + 3 * t + i] = v / WINDOW_STEP_S
             if t == 1:
-                row[_SPINS + i] = v / WINDOW_STEP_S
-        row[_OTHER + t] = np.sqrt(apart)
+                row[columns.object_angular_velocities + i] = v / WINDOW_STEP_S
+        row[columns.other_wrist_distances + t] = np.sqrt(apart)
 
 
 @kernel
-def _all_but_readings(sensors, solid, windows, positions, rotations, first, last, rays, rows):
-    """Every block of some rows but the readings of rays that have to be traced; returns how many these are."""
+def _all_but_readings(
+    hand: np.ndarray,
+    starts: Indices,
+    solid: Solid,
+    windows: Windows,
+    positions: Array,
+    rotations: Array,
+    first: int,
+    last: int,
+    rays: Rays,
+    rows: np.ndarray,
+):
+    """Every block of some rows except the readings of rays that must be traced; returns how many these are."""
+    skeleton, sensors, columns = unpack_skeleton(hand), unpack_sensors(hand), _unpack_columns(starts)
     rotation, translation = matrix(), vector()
     points, directions = _sensor_vectors(), _sensor_vectors()
     distances, normals = _joint_numbers(), _joint_vectors()
     box, traced = solid.bvh.boxes[0], 0
-    _pose_rows(positions, rotations, first, last, rows)
+    joints, count = len(skeleton.parents), len(sensors.bones)
+    _pose_rows(skeleton.parents, columns.joint_axes, positions, rotations, first, last, rows)
     for n in range(first, last):
         row, mirrored, scale = rows[n], windows.mirrored[n], windows.scale[n]
         wrist, obj = windows.wrist[n], windows.object[n]
-        _trajectory_row(wrist, windows.other_wrist[n], obj, mirrored, scale, solid.center_of_mass, row)
+        _trajectory_row(columns, wrist, windows.other_wrist[n], obj, mirrored, scale, solid.center_of_mass, row)
         place_sensors(sensors, positions[n], rotations[n], points, directions)
         for s in range(_SENSED_COUNT):
             t = SENSED[s]
             object_from_wrist(wrist[t], obj[t], mirrored, rotation, translation)
-            column = _PROXIMITY + SENSOR_COUNT * s
-            traced = aim_rays(box, rotation, translation, scale, points, directions, n, row, column, rays, traced)
+            column = columns.proximity + count * s
+            traced = aim_rays(
+                box, rotation, translation, scale, points, directions, count, n, row, column, rays, traced
+            )
             sense_distances(solid, solid.exact_within_m, rotation, translation, scale, positions[n], distances, normals)
-            for j in range(22):
-                row[_DISTANCES + 22 * s + j] = distances[j]
+            for j in range(joints):
+                row[columns.signed_distances + joints * s + j] = distances[j]
             if s == 0:
-                sense_ambient(solid.field, rotation, translation, scale, row[_AMBIENT : _AMBIENT + 1000])
-                for j in range(22):
+                occupancies = row[columns.ambient : columns.ambient + AMBIENT_CELLS**3]
+                sense_ambient(solid.field, sensors.grid_center, rotation, translation, scale, occupancies)
+                for j in range(joints):
                     for i in range(3):
-                        row[_NORMALS + 3 * j + i] = normals[j, i]
+                        row[columns.surface_normals + 3 * j + i] = normals[j, i]
     return traced

@@ -1,16 +1,26 @@
 """Signed distance sensors: how far the joints are from the surface, and which way it faces (paper, section 5.3)."""
 
+from manipnet.geometry import Array
 from manipnet.jit import inner
-from manipnet.synthesis.hand.skeleton import JOINT_COUNT
 from manipnet.synthesis.objects.distance_field import signed_distance
+from manipnet.synthesis.objects.shape import Solid
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M, map_direction_back, map_point
 
 
 @inner
-def sense_distances(solid, exact_within_m, rotation, translation, scale, positions, distances, normals):
-    """Distances of joint `positions (22, 3)` into `distances (22,)`, clamped at +10 cm, and surface directions into
-    `normals (22, 3)` in the wrist frame."""
-    for j in range(JOINT_COUNT):
+def sense_distances(
+    solid: Solid,
+    exact_within_m: float,
+    rotation: Array,
+    translation: Array,
+    scale: float,
+    positions: Array,
+    distances: Array,
+    normals: Array,
+):
+    """Distances of joint `positions (J, 3)` into `distances (J,)`, clamped at +10 cm, and surface directions into
+    `normals (J, 3)` in the wrist frame."""
+    for j in range(len(positions)):
         x, y, z = map_point(rotation, translation, scale, positions[j, 0], positions[j, 1], positions[j, 2])
         d, nx, ny, nz = signed_distance(solid.bvh, solid.field, x, y, z, exact_within_m)
         distances[j] = min(d * scale, SENSOR_RANGE_M)

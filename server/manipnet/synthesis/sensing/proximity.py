@@ -1,4 +1,4 @@
-"""Proximity sensors: rays off 104 points of the palm side (paper, section 5.2)."""
+"""Proximity sensors: rays from points on the palm side of the skin (paper, section 5.2)."""
 
 from typing import NamedTuple
 
@@ -6,30 +6,16 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel
-from manipnet.synthesis.hand.surface import SENSOR_BONES, SENSOR_NORMALS, SENSOR_POINTS, SENSOR_WEIGHTS
+from manipnet.synthesis.hand.hand import Sensors
 from manipnet.synthesis.objects.rays import RayScene
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
 
-SENSOR_COUNT = len(SENSOR_BONES)
 _ROUNDING_M = 1e-5
 """Rays are traced in single precision: one that passes a box this near may touch what fills it."""
 
 
-class Sensors(NamedTuple):
-    """Points of the skin with the bones they follow: an argument of the kernels, because compiled code is cached by
-    its own file and would not notice another surface."""
-
-    bones: np.ndarray
-    weights: Array
-    points: Array
-    normals: Array
-
-
-SENSORS = Sensors(SENSOR_BONES, SENSOR_WEIGHTS, SENSOR_POINTS, SENSOR_NORMALS)
-
-
 class Rays(NamedTuple):
-    """Room for rays in the coordinates of the object they are traced against, at most `N` of them."""
+    """Memory for `N` rays in the coordinates of the object they are traced against."""
 
     origins: np.ndarray
     """`(N, 3)` float32."""
@@ -40,14 +26,14 @@ class Rays(NamedTuple):
 
 
 def allocate_rays(count: int) -> Rays:
-    """Room for `count` rays."""
+    """Memory for `count` rays."""
     return Rays(np.empty((count, 3), np.float32), np.empty((count, 3), np.float32), np.empty((count, 2), np.int32))
 
 
 @inner
-def place_sensors(sensors, positions, rotations, points, normals):
-    """Skin the sensors to a pose: `positions (22, 3)`, `rotations (17, 3, 3)` into `points`, `normals (104, 3)`."""
-    for s in range(SENSOR_COUNT):
+def place_sensors(sensors: Sensors, positions: Array, rotations: Array, points: Array, normals: Array):
+    """Skin the sensors to the pose `positions (J, 3)`, `rotations (B, 3, 3)`, into `points` and `normals (S, 3)`."""
+    for s in range(len(sensors.bones)):
         for i in range(3):
             points[s, i] = normals[s, i] = 0.0
         for k in range(sensors.bones.shape[1]):
@@ -67,15 +53,28 @@ def place_sensors(sensors, positions, rotations, points, normals):
 
 
 @inner
-def aim_rays(box, rotation, translation, scale, points, normals, row, readings, first_column, rays, count):
-    """Carry the sensors of one instant into the object's coordinates, as rays from number `count` on; returns the new
-    count.
+def aim_rays(
+    box: Array,
+    rotation: Array,
+    translation: Array,
+    scale: float,
+    points: Array,
+    normals: Array,
+    sensors: int,
+    row: int,
+    readings: np.ndarray,
+    first_column: int,
+    rays: Rays,
+    count: int,
+):
+    """Carry the first `sensors` points of one instant into the object's coordinates, as rays from number `count` on;
+    returns the new count.
 
     A ray that cannot reach the object's `box (6,)` reads its full range: that is written into `readings` from
-    `first_column` on, and the ray left out. `row` and column are noted with the others.
+    `first_column` on, and the ray is left out. The others are stored with their `row` and column.
     """
     reach, size = SENSOR_RANGE_M / scale, 1.0 / scale
-    for s in range(SENSOR_COUNT):
+    for s in range(sensors):
         column = first_column + s
         readings[column] = SENSOR_RANGE_M
         enter, leave = 0.0, reach
@@ -101,10 +100,10 @@ def aim_rays(box, rotation, translation, scale, points, normals, row, readings, 
 
 
 def read_rays(scene: RayScene, rays: Rays, count: int, scale: Array, rows: np.ndarray) -> None:
-    """Trace the first `count` rays and put their readings, metres, into the features `rows (N, 2356)`.
+    """Trace the first `count` rays and put their readings, metres, into the features `rows (N, input_size)`.
 
-    `scale (N,)` is the object's. Positive outside, at most +10 cm. A first hit on a surface that faces away means the
-    sensor is inside: the ray is reversed and the reading negative, at least -10 cm.
+    `scale (N,)` is the object's. A reading is positive outside, at most +10 cm. A first hit on a surface that faces
+    away means that the sensor is inside: its ray is reversed and the reading is negative, at least -10 cm.
     """
     if count == 0:
         return
@@ -116,8 +115,8 @@ def read_rays(scene: RayScene, rays: Rays, count: int, scale: Array, rows: np.nd
 
 
 @kernel
-def _put_readings(distance, inside, rays, scale, rows):
-    """Write what rays read, turn those around that began inside, and return how many these are."""
+def _put_readings(distance: np.ndarray, inside: np.ndarray, rays: Rays, scale: Array, rows: np.ndarray):
+    """Write what the rays read, reverse those that began inside, and return how many these are."""
     buried = 0
     for k in range(len(distance)):
         row, column = rays.places[k, 0], rays.places[k, 1]
@@ -132,7 +131,7 @@ def _put_readings(distance, inside, rays, scale, rows):
 
 
 @kernel
-def _put_depths(depth, rays, scale, rows):
+def _put_depths(depth: np.ndarray, rays: Rays, scale: Array, rows: np.ndarray):
     for k in range(len(depth)):
         row, column = rays.places[k, 0], rays.places[k, 1]
         rows[row, column] = -min(depth[k] * scale[row], SENSOR_RANGE_M)

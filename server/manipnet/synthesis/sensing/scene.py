@@ -1,22 +1,15 @@
-"""Where things are, as the kernels see them: one hand's window in its own wrist frame, as if it were a right hand."""
+"""The map between a hand's wrist frame and an object's own frame, as kernels see the scene: every hand a right one."""
 
+from manipnet.geometry import Array
 from manipnet.jit import inner, matrix
+from manipnet.synthesis.rotations import quat_to_matrix_into
 
 SENSOR_RANGE_M = 0.10
-"""Where proximity and signed distances saturate (paper, section 5.2)."""
+"""Distance at which the proximity and signed distance sensors saturate (paper, section 5.2)."""
 
 
 @inner
-def quat_to_matrix_into(q, out):
-    """Rotation matrix of the unit quaternion `q (4,)` xyzw, into `out (3, 3)`."""
-    x, y, z, w = q[0], q[1], q[2], q[3]
-    out[0, 0], out[0, 1], out[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
-    out[1, 0], out[1, 1], out[1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
-    out[2, 0], out[2, 1], out[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-
-
-@inner
-def object_from_wrist(wrist, obj, mirrored, rotation, translation):
+def object_from_wrist(wrist: Array, obj: Array, mirrored: bool, rotation: Array, translation: Array):
     """From wrist coordinates to the object's own metres: `x_object = (rotation · x_wrist + translation) / scale`.
 
     `wrist` and `obj` are poses `(7,)` of the scene as the network sees it; in a mirrored scene the object is its mirror
@@ -35,7 +28,7 @@ def object_from_wrist(wrist, obj, mirrored, rotation, translation):
 
 
 @inner
-def map_point(rotation, translation, scale, x, y, z):
+def map_point(rotation: Array, translation: Array, scale: float, x: float, y: float, z: float):
     """A point in wrist coordinates to the object's own coordinates."""
     size = 1.0 / scale  # the same for many points: one division for all of them
     return (
@@ -46,7 +39,7 @@ def map_point(rotation, translation, scale, x, y, z):
 
 
 @inner
-def map_direction_back(rotation, x, y, z):
+def map_direction_back(rotation: Array, x: float, y: float, z: float):
     """A direction in the object's coordinates to wrist coordinates."""
     return (
         rotation[0, 0] * x + rotation[1, 0] * y + rotation[2, 0] * z,
