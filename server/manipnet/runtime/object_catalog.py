@@ -1,4 +1,4 @@
-"""The objects that a server knows or can load, by name: their shapes, each of which is built once while it is in use."""
+"""The objects that a server knows or can load, by name: their shapes, each of which is built once while in use."""
 
 import logging
 import threading
@@ -33,8 +33,9 @@ class ObjectCatalog:
     """Shapes of the rig, of the user's `folder` and of the library. Thread-safe.
 
     A shape is built on the thread that first asks for it. It is kept while it is in use, and while it is among the
-    `MAX_UNUSED` that were asked for last. An object that a client has added is forgotten with its shape. If two objects have the same name, the rig's comes before the
-    folder's, and the folder's before the library's.
+    `MAX_UNUSED` that were asked for last. An object that a client has added is forgotten with its shape.
+
+    If two objects have the same name, the rig's comes before the folder's, and the folder's before the library's.
     """
 
     def __init__(
