@@ -1,6 +1,5 @@
 """Clients that ask for ever more: the server stays bounded, publishes, and answers the others at once."""
 
-import json
 import threading
 import time
 from collections.abc import Iterator
@@ -117,7 +116,7 @@ def test_a_recording_that_begins_lets_others_be_answered(server: LiveServer, tmp
     ],
 )
 def test_what_makes_no_sense_is_refused_by_its_reason(server: LiveServer, request_: dict) -> None:
-    error = server.ask(json.dumps(request_).encode(), as_json=True).get("error", "")
+    error = server.ask(request_, as_json=True).get("error", "")
     assert error
     assert "inside the server" not in error
 

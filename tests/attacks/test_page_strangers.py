@@ -120,7 +120,7 @@ def test_no_frame_of_a_foreign_page_shows_it(server: LiveServer, chromium: str, 
     ):
         page.wait_for("document.readyState === 'complete'", BROWSER_S)
         # A refused frame shows the browser's own error page, which is of no origin a script may read.
-        assert page.evaluate("document.getElementById('it').contentDocument === null")
+        page.wait_for("document.getElementById('it').contentDocument === null", BROWSER_S)
         frames = page.call("Page.getFrameTree")["frameTree"].get("childFrames", [])
         assert all(
             frame["frame"]["url"].startswith("chrome-error:") or frame["frame"].get("unreachableUrl")
