@@ -69,9 +69,9 @@ class Page:
         """Import a mesh file that was dropped on the page; returns the message for its visitor."""
         panel = next((panel for panel in self._panels.values() if panel.objects is not None), None)
         if panel is None or panel.objects is None:
-            return "nobody is here who may bring in files"
+            return "only a visitor on the server's own machine can import files"
         try:
-            return panel.objects.bring_in(name, content)
+            return panel.objects.import_mesh(name, content)
         except (RefusedError, ValueError, OSError) as error:
             return str(error)
 

@@ -1,4 +1,4 @@
-"""What the server hands to its live page: one tick of one actor, and the shapes it is about."""
+"""What the server sends to its live page: one tick of one actor, and the shapes of the props in it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from manipnet.wire import HandsMessage, Side
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PropView:
-    """A prop: its body's name, its shape's name and hash, its size over the shape's, and where on its body it sits."""
+    """A prop: the name of its body, the name and hash of its shape, its scale, and its place on the body."""
 
     name: str
     object: str
@@ -23,18 +23,18 @@ class PropView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandView:
-    """What the network said of one hand, in its own wrist frame as a right hand of the model's size."""
+    """The network's output for one hand, in its wrist frame, as a right hand of the model's size."""
 
     prop: str
     distances: Array
-    """`(22,)` joint to surface, as predicted."""
+    """`(J,)` predicted distances of the joints to the surface."""
     raw_positions: Array
-    """`(22, 3)` before inverse kinematics."""
+    """`(J, 3)` joint positions before inverse kinematics."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One tick of one actor. `windows` are the trajectories `(21, 7)` about it, by body."""
+    """One tick of one actor. `windows` are the trajectories `(21, 7)` around the tick, by body."""
 
     message: HandsMessage
     props: tuple[PropView, ...]

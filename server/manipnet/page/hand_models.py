@@ -1,4 +1,4 @@
-"""Hands as people see them: the project's own skin, bent by the bones of each message."""
+"""Hands in the scene: the skin of the hand, deformed by the bones of each message."""
 
 from typing import Final
 
@@ -13,23 +13,23 @@ from manipnet.wire import HandPose, Side
 
 SKIN: Final = {"right": (226, 168, 138), "left": (213, 153, 128)}
 PALE: Final = {"right": (176, 164, 158), "left": (168, 156, 151)}
-"""A hand that is not live: held, or at rest."""
+"""Colours of a hand that is not live, but held or at rest."""
 GHOST: Final = (140, 190, 255)
 
 
 def wxyz(q: Array) -> Array:
-    """Quaternions xyzw as viser has them."""
+    """Quaternions xyzw in the order that viser expects."""
     return q[..., [3, 0, 1, 2]]
 
 
 def world_bones(hand: Hand, side: Side, scale: float, angles: Array, wrist: Array) -> tuple[Array, Array]:
-    """Joint positions `(22, 3)` and bone rotations `(17, 4)` in the world of a hand in a pose."""
+    """World positions of the joints `(J, 3)` and world rotations of the bones `(B, 4)`."""
     positions, rotations = forward_kinematics(hand, np.asarray(angles, np.float64))
     return hand_to_world(side, np.asarray(wrist, np.float64), positions * scale, rotations)
 
 
 class HandModel:
-    """One hand in the scene under `name`; `ghost` makes it a translucent one."""
+    """One hand in the scene under `name`, translucent if it is a `ghost`."""
 
     def __init__(
         self, scene: viser.SceneApi, name: str, hand: Hand, side: Side, scale: float, ghost: bool = False
@@ -56,7 +56,7 @@ class HandModel:
         )
 
     def pose(self, hand: HandPose, wrist: Array | None = None) -> None:
-        """Bend to a message's hand; `wrist (7,)` puts it elsewhere."""
+        """Take the pose of a message's hand, at another `wrist (7,)` if one is given."""
         wrist = hand.wrist if wrist is None else wrist
         positions, quats = world_bones(self._hand, self.side, self.scale, hand.angles, wrist)
         for bone, position, quat in zip(self._mesh.bones, positions, wxyz(quats), strict=False):
@@ -66,16 +66,16 @@ class HandModel:
             self._mesh.color = (PALE if self._pale else SKIN)[self.side]
 
     def show(self, visible: bool) -> None:
-        """Show or hide it."""
+        """Show or hide the hand."""
         self._mesh.visible = visible
 
     def remove(self) -> None:
-        """Take it out of the scene."""
+        """Remove the hand from the scene."""
         self._mesh.remove()
 
 
 def _dense_weights(hand: Hand) -> np.ndarray:
-    """The skin's weights for every bone, `(V, B)` float32."""
+    """Weights of all bones for each vertex of the skin, `(V, B)` float32."""
     weights = np.zeros((len(hand.skin.vertices), hand.bone_count), np.float32)
     np.add.at(weights, (np.arange(len(weights))[:, None], hand.skin.bones), hand.skin.weights)
     return weights

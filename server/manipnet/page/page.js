@@ -1,4 +1,4 @@
-// What the page adds to viser's client: its title, and files that are dropped on it.
+// Added to viser's client: the title of the page, and the import of mesh files that are dropped on it.
 document.title = "ManipNet Live";
 
 const veil = document.createElement("div");
@@ -15,20 +15,20 @@ note.style.cssText =
   "padding:10px 18px;border-radius:8px;font:15px sans-serif;color:#fff;background:#22304a";
 document.body.append(note);
 
-function tell(text) {
+function notify(text) {
   note.textContent = text;
   note.style.display = "block";
-  clearTimeout(tell.timer);
-  tell.timer = setTimeout(() => (note.style.display = "none"), 8000);
+  clearTimeout(notify.timer);
+  notify.timer = setTimeout(() => (note.style.display = "none"), 8000);
 }
 
-function bringIn(file) {
+function importMesh(file) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const socket = new WebSocket(`${scheme}://${location.host}/drop?name=${encodeURIComponent(file.name)}`);
-  tell(`${file.name} …`);
+  notify(`${file.name} …`);
   socket.onopen = async () => socket.send(await file.arrayBuffer());
-  socket.onmessage = (event) => tell(event.data);
-  socket.onclose = (event) => event.reason && tell(event.reason);
+  socket.onmessage = (event) => notify(event.data);
+  socket.onclose = (event) => event.reason && notify(event.reason);
 }
 
 addEventListener("dragover", (event) => {
@@ -39,5 +39,5 @@ addEventListener("dragleave", (event) => event.relatedTarget || (veil.style.disp
 addEventListener("drop", (event) => {
   event.preventDefault();
   veil.style.display = "none";
-  for (const file of event.dataTransfer.files) bringIn(file);
+  for (const file of event.dataTransfer.files) importMesh(file);
 });

@@ -1,4 +1,4 @@
-"""The panel of one visitor: how things stand for everybody, controls for those who may."""
+"""The panel of one visitor: the state of the server for everybody, and controls for operators."""
 
 import math
 from typing import Any
@@ -16,11 +16,15 @@ from manipnet.page.show import Show
 from manipnet.page.takes_tab import TakesTab
 
 DOTS = {"live": "●", "hold": "◐", "rest": "○"}
-NOTE_S = 6.0
+"""How the health table shows the state of a body."""
+NOTIFICATION_S = 6.0
 
 
 class Panel:
-    """Built when a visitor comes. An operator sits on this machine; others only look."""
+    """Panels of one visitor, built when the visitor connects.
+
+    An operator is a visitor on the server's own machine. Only operators get the controls.
+    """
 
     def __init__(self, ask: Ask, show: Show, client: viser.ClientHandle, operator: bool) -> None:
         self._ask, self._show, self._client = ask, show, client
@@ -30,7 +34,7 @@ class Panel:
         self._paused = False
         gui = client.gui
         gui.main_panel.dock_right()
-        self._headline = gui.add_markdown("**connecting …**")
+        self._headline = gui.add_markdown("**Connecting …**")
         if operator:
             self._controls(gui)
             tabs = gui.add_tab_group()
@@ -49,11 +53,11 @@ class Panel:
         side.dock_left()
 
     def refresh(self) -> None:
-        """Bring it up to date, twice a second."""
+        """Update everything; called twice a second."""
         try:
             self._refresh()
         except RefusedError as error:
-            self._headline.content = f"**the server does not answer:** {error}"
+            self._headline.content = f"**The server does not answer:** {error}"
 
     def _refresh(self) -> None:
         history = next(iter(self._show.histories.values()), None) or History()
@@ -69,7 +73,7 @@ class Panel:
             self._takes.refresh()
 
     def follow(self, frame: Frame | None) -> None:
-        """Let what hangs on a prop be where it is at a tick; None for a recording."""
+        """Move the gizmo with its prop; None means that a recording is shown."""
         if self.objects is not None:
             self.objects.follow(frame)
 
@@ -78,21 +82,23 @@ class Panel:
         try:
             text = action()
         except (RefusedError, ValueError, OSError) as error:
-            self._client.add_notification("That did not work", str(error), color="red", auto_close_seconds=3 * NOTE_S)
+            self._client.add_notification(
+                "That did not work", str(error), color="red", auto_close_seconds=3 * NOTIFICATION_S
+            )
         else:
             if text:
-                self._client.add_notification("Done", text, color="green", auto_close_seconds=NOTE_S)
+                self._client.add_notification("Done", text, color="green", auto_close_seconds=NOTIFICATION_S)
 
     def _controls(self, gui: viser.GuiApi) -> None:
-        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="hold the hands where they are")
+        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="Hold the hands where they are")
         rest = gui.add_button(
-            "Rest", icon=viser.Icon.HAND_STOP, hint="ease the hands to their rest pose, to begin anew"
+            "Rest", icon=viser.Icon.HAND_STOP, hint="Ease the hands to their rest pose and start again from there"
         )
         self._on_click(self._pause, self._toggle_pause)
         self._on_click(rest, self._asking(op="rest"))
 
     def _scene(self, gui: viser.GuiApi) -> None:
-        slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
+        slider = gui.add_slider("Look-ahead (ms)", 0, 500, 10, initial_value=500)
         slider.on_update(by_visitor(lambda: self.perform(self._asking(op="look_ahead", seconds=1e-3 * slider.value))))
         for name, label in OVERLAYS.items():
             box = gui.add_checkbox(label, name in self._show.overlays)
@@ -106,7 +112,7 @@ class Panel:
     def _show_paused(self, paused: bool) -> None:
         if paused != self._paused:
             self._paused = paused
-            self._pause.label = "Go on" if paused else "Pause"
+            self._pause.label = "Resume" if paused else "Pause"
             self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
 
     def _asking(self, **request: Any) -> Action:
@@ -122,13 +128,13 @@ class Panel:
 def _headline(show: Show, status: dict[str, Any], history: History) -> str:
     frames = show.live.values()
     if not frames:
-        return "○ **Waiting for bodies**: `manipnet doctor` says why nothing arrives"
+        return "○ **Waiting for tracked bodies.** If none arrive, run `manipnet doctor`."
     latency = next(iter(frames)).message.latency_ms
-    what = "◐ **Paused**" if _paused(status) else "● **Live**"
+    state = "◐ **Paused**" if _paused(status) else "● **Live**"
     if show.recording is not None:
-        what = f"▶ **{show.recording.name}**"
-    waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms work"
-    return f"{what} · {history.rate_hz:.0f} hands/s\n\n{waits}"
+        state = f"▶ **{show.recording.name}**"
+    delay = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms computation"
+    return f"{state} · {history.rate_hz:.0f} hands/s\n\n{delay}"
 
 
 def _paused(status: dict[str, Any]) -> bool:
@@ -136,7 +142,7 @@ def _paused(status: dict[str, Any]) -> bool:
 
 
 def _health(status: dict[str, Any]) -> str:
-    rows = ["| | body | per s | seen |", "|---|---|--:|--:|"]
+    rows = ["| | body | Hz | last seen |", "|---|---|--:|--:|"]
     hands = []
     for name, actor in status["actors"].items():
         if len(status["actors"]) > 1:
@@ -146,12 +152,12 @@ def _health(status: dict[str, Any]) -> str:
             age = "never" if age_s is None or not math.isfinite(age_s) else _ago(age_s)
             rows.append(f"| {DOTS[health['state']]} | {body} | {rate_hz or 0.0:.0f} | {age} |")
         for side, hand in actor["hands"].items():
-            hands.append(f"{side} hand **{hand['state']}**" + (f" on {hand['object']}" if hand["object"] else ""))
+            hands.append(f"{side} hand: **{hand['state']}**" + (f", {hand['object']}" if hand["object"] else ""))
     counters = status["counters"]
-    lost = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
-    refused = f"{lost} frames and bodies refused" if lost else "nothing refused"
-    return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, f"{refused} since the start"])
+    rejected = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
+    lines = [*hands, f"{rejected or 'no'} frames or bodies rejected since the start"]
+    return "\n".join(rows) + "\n\n" + "\n\n".join(lines)
 
 
 def _ago(age_s: float) -> str:
-    return f"{1e3 * age_s:.0f} ms" if age_s < 1.0 else f"{age_s:.0f} s ago"
+    return f"{1e3 * age_s:.0f} ms ago" if age_s < 1.0 else f"{age_s:.0f} s ago"

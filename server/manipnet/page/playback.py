@@ -1,4 +1,4 @@
-"""Recordings on the page: the hands of an MCAP file as frames, at any instant."""
+"""Recordings on the page: the hands of an MCAP file as frames at any time."""
 
 import json
 import tempfile
@@ -16,7 +16,7 @@ from manipnet.wire import HandsMessage
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What a file holds for the eye: the hands of its first actor, and the shapes of its props by hash."""
+    """The visible content of a file: the hands of its first actor, and the shapes of the props by hash."""
 
     name: str
     messages: tuple[HandsMessage, ...]
@@ -25,11 +25,11 @@ class Recording:
 
     @property
     def seconds(self) -> float:
-        """How long it is."""
+        """The length of the recording."""
         return self.messages[-1].t_capture - self.messages[0].t_capture
 
     def at(self, second: float) -> Frame:
-        """The tick at or after a second from the begin, as the page shows it; what hands sensed is in no recording."""
+        """The first frame at or after a time since the beginning. Recordings hold no sensor data."""
         begin_s = self.messages[0].t_capture
         index = bisect_left(self.messages, begin_s + second, key=lambda message: message.t_capture)
         return Frame(self.messages[min(index, len(self.messages) - 1)], self.props, {}, {})
@@ -39,7 +39,9 @@ def read_recording(path: Path) -> Recording:
     """Read a recording. Raises `RecordingError`, also for one without hands."""
     messages = list(read_hands(path))
     if not messages:
-        raise RecordingError(f"{path.name}: holds no hands; it is the tracker's bodies alone (`manipnet replay` it)")
+        raise RecordingError(
+            f"{path.name}: has no hands, only the bodies of the tracker; play it with `manipnet replay`"
+        )
     messages = tuple(message for message in messages if message.actor == messages[0].actor)
     props, shapes = [], {}
     for name, (mesh, scale) in _meshes(read_about(path)).items():
@@ -49,7 +51,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def _meshes(about: About) -> dict[str, tuple[ClosedMesh, float]]:
-    """Mesh and its size by body; one that cannot be read is not shown."""
+    """Meshes and their scales by body. A mesh that cannot be read is left out."""
     meshes: dict[str, tuple[ClosedMesh, float]] = {}
     for body, carried in json.loads(about.metadata.get("objects", "{}")).items():
         if carried.get("object") in library_names():

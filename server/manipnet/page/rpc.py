@@ -1,4 +1,4 @@
-"""The page's process at the other end: what the server hands over, and requests to it."""
+"""The connection of the page's process with the server: what it receives, and requests to the server."""
 
 import contextlib
 import itertools
@@ -15,37 +15,37 @@ import msgpack
 from manipnet.page.serialization import pack, unpack
 
 ANSWER_S: Final = 60.0
-"""A shape of a large mesh takes a while to build."""
+"""Building the shape of a large mesh takes some time."""
 
 
 class RefusedError(RuntimeError):
-    """A request the server did not meet; the text says why."""
+    """The server refused a request or did not answer; the text says why."""
 
 
 class RpcClient:
-    """`incoming` on one thread; `ask` and `watch` on any other."""
+    """One thread iterates over `incoming`; any other thread may call `ask`, `watch` and `log`."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._sending = threading.Lock()
         self._numbers = itertools.count()
-        self._asked: dict[int, Future] = {}
+        self._pending: dict[int, Future] = {}
 
     def incoming(self) -> Iterator[tuple[str, Any]]:
-        """Everything but answers, as it comes; ends when the server does."""
+        """Yield all messages except answers as they arrive; ends with the server."""
         with contextlib.suppress(EOFError, OSError):
             while True:
                 what, content = unpack(self._connection.recv_bytes())
                 if what == "answer":
                     number, answer = content
-                    self._asked.pop(number).set_result(msgpack.unpackb(answer))
+                    self._pending.pop(number).set_result(msgpack.unpackb(answer))
                 else:
                     yield what, content
 
     def ask(self, **request: Any) -> dict[str, Any]:
-        """One control request, as in docs/protocol.md, and its answer. Raises `RefusedError`."""
+        """Send a control request, as in docs/protocol.md, and return the answer. Raises `RefusedError`."""
         number, answer = next(self._numbers), Future()
-        self._asked[number] = answer
+        self._pending[number] = answer
         self._send("ask", (number, msgpack.packb(request)))
         try:
             reply = answer.result(ANSWER_S)
@@ -56,25 +56,25 @@ class RpcClient:
         return reply
 
     def watch(self, watched: bool) -> None:
-        """Tell whether a browser is open."""
+        """Report whether a browser is open."""
         self._send("watched", watched)
 
     def log(self, level: int, text: str) -> None:
-        """A line for the server's log."""
+        """Write a line to the server's log."""
         self._send("log", (level, text))
 
     def _send(self, what: str, content: Any) -> None:
-        with self._sending, contextlib.suppress(OSError):  # the server has ended: `incoming` notices
+        with self._sending, contextlib.suppress(OSError):  # the server has ended, and then `incoming` ends too
             self._connection.send_bytes(pack(what, content))
 
 
 class RpcLog(logging.Handler):
-    """Carries the log of this process to the server's."""
+    """Forwards the log of this process to the server's log."""
 
     def __init__(self, link: RpcClient) -> None:
         super().__init__(logging.WARNING)
         self._link = link
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Send one record."""
+        """Forward one record."""
         self._link.log(record.levelno, self.format(record))

@@ -1,4 +1,4 @@
-"""Where the hands perform: light, a round table, and a camera that finds them."""
+"""The scenery: lights, a round table, and the view of a visitor's camera."""
 
 from typing import Final
 
@@ -11,15 +11,15 @@ TABLE_M: Final = (0.62, 0.03)
 """Radius and thickness."""
 TABLE_COLOR: Final = (66, 71, 80)
 VIEW: Final = np.array([0.22, 0.50, 0.85])
-"""From the hands to the camera."""
+"""Direction from the hands to the camera."""
 VIEW_M: Final = 0.92
 KEY_M, RIM_M = np.array([0.35, 1.4, 0.55]), np.array([-0.8, 0.6, -0.9])
-"""From the hands to the lights."""
+"""Offsets from the hands to the lights."""
 FIELD_OF_VIEW_RAD: Final = 0.70
 
 
 class Scenery:
-    """The scenery. It settles under the first things that are shown, and below whatever is lower later."""
+    """Lights and table. The table is placed under the first frame, and moves down when something is lower."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -34,11 +34,11 @@ class Scenery:
 
     @property
     def placed(self) -> bool:
-        """Whether anything has been shown yet."""
+        """Whether the table has been placed."""
         return self._table is not None
 
     def place(self, points: Array, floor_m: float) -> None:
-        """Put the table at the height `floor_m` below `points (n, 3)`, in whose middle cameras look."""
+        """Put the top of the table at the height `floor_m`, under `points (n, 3)`; cameras look at their middle."""
         self._center = 0.5 * (points.min(axis=0) + points.max(axis=0))
         x, _, z = self._center
         if self._table is not None:
@@ -56,13 +56,13 @@ class Scenery:
         self._rim.position = tuple(self._center + RIM_M)
 
     def lower(self, floor_m: float) -> None:
-        """See that the table is not above `floor_m`."""
+        """Move the table down to `floor_m` if it is higher."""
         if self._table is not None and floor_m < self._table.position[1] + 0.5 * TABLE_M[1]:
             x, _, z = self._table.position
             self._table.position = (x, floor_m - 0.5 * TABLE_M[1], z)
 
     def look(self, camera: viser.CameraHandle) -> None:
-        """Let a visitor's camera see the hands."""
+        """Point a visitor's camera at the hands."""
         back = VIEW / np.linalg.norm(VIEW)
         camera.up_direction = (0.0, 1.0, 0.0)
         camera.fov = FIELD_OF_VIEW_RAD

@@ -1,4 +1,4 @@
-"""What passes between the server and its page's process, as msgpack: reading it can run nothing."""
+"""Messages between the server and the page's process. They are msgpack, so reading one cannot run code."""
 
 from dataclasses import fields
 from typing import Any, Final
@@ -11,17 +11,17 @@ from manipnet.wire import HandsMessage, decode_msgpack, encode_msgpack
 
 _ARRAY, _HANDS = 1, 2
 _VIEWS: Final[dict[int, type]] = {3: PropView, 4: HandView, 5: Frame, 6: ShapeView}
-"""Values that travel as the tuple of their fields, by the extension type that says so."""
+"""Values that are sent as the tuple of their fields, by their extension type."""
 _CODES: Final = {kind: code for code, kind in _VIEWS.items()}
 
 
 def pack(what: str, content: Any) -> bytes:
-    """One message. Its content is what msgpack knows, a frame or a shape."""
+    """One message. Its content may be anything that msgpack supports, a frame or a shape."""
     return _packed((what, content))
 
 
 def unpack(payload: bytes) -> tuple[str, Any]:
-    """Inverse of `pack`; lists become tuples."""
+    """The inverse of `pack`, except that lists become tuples."""
     return _unpacked(payload)
 
 
@@ -39,7 +39,7 @@ def _extended(value: Any) -> msgpack.ExtType:
     if isinstance(value, HandsMessage):
         return msgpack.ExtType(_HANDS, encode_msgpack(value, checked=True))
     if type(value) not in _CODES:
-        raise TypeError(f"{type(value).__name__} has no place in a message to or from the page")
+        raise TypeError(f"{type(value).__name__} cannot be sent to or from the page")
     return msgpack.ExtType(_CODES[type(value)], _packed([getattr(value, field.name) for field in fields(value)]))
 
 
@@ -49,5 +49,5 @@ def _restored(code: int, payload: bytes) -> Any:
     content = _unpacked(payload)
     if code == _ARRAY:
         dtype, shape, values = content
-        return np.frombuffer(values, dtype).reshape(shape).copy()  # kernels want arrays that can be written to
+        return np.frombuffer(values, dtype).reshape(shape).copy()  # kernels require writable arrays
     return _VIEWS[code](*content)

@@ -1,8 +1,8 @@
-"""The live page as its server sees it: an address, and a process of its own from the first visit on.
+"""The server's side of the live page: its address, and the process that serves it from the first visit on.
 
-Nothing of the page runs in the server: it costs a socket until a browser comes, and then what one thread needs to hand
-over the newest tick. The process ends with the server, however that ends; when the process ends, the next visit or the
-browser's own reconnecting starts another.
+The page costs the server a socket until a browser connects, and then one thread that sends the newest ticks to the
+page's process. That process ends with the server, however the server ends. If the process ends first, the next visit or
+the browser's reconnecting starts another one.
 """
 
 import contextlib
@@ -31,30 +31,33 @@ from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
 
 FRAMES_HZ: Final = 30.0
-"""As many ticks a second go to the page; the newest ones."""
+"""At most this many ticks per second are sent to the page, always the newest."""
 POLL_S: Final = 0.2
-"""A stop is noticed within this."""
+"""Longest time until a stop is noticed."""
 STOP_S: Final = 3.0
 RESTART_S: Final = (0.5, 30.0)
-"""Before a page that ended is started again; longer each time it does not last."""
+"""Shortest and longest pause before a page that ended is started again. The pause doubles each time."""
 LASTED_S: Final = 60.0
+"""After a page that ran for this long, the pause is short again."""
 
 _log = logging.getLogger(__name__)
 Answer = Callable[[list[bytes]], bytes]
 
 
 class LivePage:
-    """Listens from construction to `stop`, serves from `start`. `see` belongs to the tick thread."""
+    """Listens from its construction until `stop`, and serves from `start`. The tick thread calls `see`."""
 
     def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry, hand_file: Path) -> None:
-        """Raises `ListenError`. `answer` meets the page's requests, as it does any client's; `hand_file` describes the
-        hand that is shown."""
+        """`answer` answers the page's control requests, and `hand_file` describes the hand to show.
+
+        Raises `ListenError`.
+        """
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
         self._answer, self._telemetry, self._hand_file = answer, telemetry, hand_file
         self.watched = False
-        """Whether a browser is open: only then is there anything to `see`."""
-        self._news, self._telling = threading.Condition(), threading.Lock()
+        """Whether a browser is open. Otherwise `see` need not be called."""
+        self._arrived, self._sending = threading.Condition(), threading.Lock()
         self._newest: dict[str, tuple[Frame, Sequence[Shape]]] = {}
         self._stopping = threading.Event()
         self._wake, self._woken = socket.socketpair()
@@ -65,13 +68,13 @@ class LivePage:
         self._thread.start()
 
     def see(self, actor: Actor, plan: Plan, message: HandsMessage) -> None:
-        """Offer a tick: nothing is computed or copied for it. One that nobody took makes room for the next."""
+        """Offer a tick without computing or copying anything. It replaces the last one, if that was not sent yet."""
         frame = frame_of(actor, plan.tick, plan.steps, message)
-        with self._news:
+        with self._arrived:
             if message.actor in self._newest:
                 self._telemetry.count("page_frames", fate="skipped")
             self._newest[message.actor] = frame, [prop.shape for prop in actor.props]
-            self._news.notify()
+            self._arrived.notify()
 
     def stop(self) -> None:
         """End the page and free the port."""
@@ -88,17 +91,17 @@ class LivePage:
             begin_s = time.monotonic()
             try:
                 self._serve()
-            except Exception as error:  # whatever it is, the session goes on without a page
-                _log.error("the page: %s: %s", type(error).__name__, error)
+            except Exception as error:  # the session continues without a page
+                _log.error("page: %s: %s", type(error).__name__, error)
             if self._stopping.is_set():
                 return
             self._telemetry.count("page_ended", reason="crash")
-            _log.error("the page's process has ended; the session goes on, and a visit starts the page again")
+            _log.error("the page's process has ended; the session continues, and the next visit starts the page again")
             pause_s = RESTART_S[0] if time.monotonic() - begin_s > LASTED_S else min(2.0 * pause_s, RESTART_S[1])
             self._stopping.wait(pause_s)
 
     def _visited(self) -> bool:
-        """Wait for a browser; False when the server stops."""
+        """Wait for a browser; returns False when the server stops."""
         with selectors.DefaultSelector() as selector:
             selector.register(self._listener, selectors.EVENT_READ)
             selector.register(self._woken, selectors.EVENT_READ)
@@ -106,24 +109,24 @@ class LivePage:
         return not self._stopping.is_set()
 
     def _serve(self) -> None:
-        """One life of the page's process."""
+        """Start the page's process, and serve until it or the server ends."""
         child = ChildProcess("page", _page, self._listener, self._hand_file)
         ours = child.connection
-        sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
+        sender = threading.Thread(target=self._send_frames, args=(ours,), name="page-out", daemon=True)
         try:
             sender.start()
-            self._listen_to(ours)
+            self._receive(ours)
         finally:
             self.watched = False
             child.close(STOP_S)
             child.kill()
-            with self._news:
+            with self._arrived:
                 self._newest.clear()
-                self._news.notify()
+                self._arrived.notify()
             sender.join()
 
-    def _listen_to(self, ours: Connection) -> None:
-        """Until the process or the server ends: who watches, what is asked, what is worth a line in the log."""
+    def _receive(self, ours: Connection) -> None:
+        """Handle the messages of the page's process until it or the server ends."""
         while not self._stopping.is_set():
             try:
                 if not ours.poll(POLL_S):
@@ -135,17 +138,17 @@ class LivePage:
                 self.watched = content
             elif what == "ask":
                 number, request = content
-                self._tell(ours, "answer", (number, self._answer([request])))
+                self._send_message(ours, "answer", (number, self._answer([request])))
             elif what == "log":
                 _log.log(content[0], "%s", content[1])
 
-    def _send(self, ours: Connection) -> None:
-        """Hand over the newest ticks, and each shape before the first tick it is in."""
+    def _send_frames(self, ours: Connection) -> None:
+        """Send the newest ticks, and each shape before the first tick that contains it."""
         sent: set[str] = set()
         while not ours.closed:
-            with self._news:
+            with self._arrived:
                 if not self._newest:
-                    self._news.wait(1.0)
+                    self._arrived.wait(1.0)
                 newest, self._newest = list(self._newest.values()), {}
             begin_s = time.monotonic()
             for frame, shapes in newest:
@@ -154,19 +157,19 @@ class LivePage:
                         sent.add(shape.content_hash)
                         mesh = shape.mesh
                         view = ShapeView(shape.name, shape.content_hash, mesh.vertices, mesh.faces)
-                        self._tell(ours, "shape", view)
-                self._tell(ours, "frame", frame)
+                        self._send_message(ours, "shape", view)
+                self._send_message(ours, "frame", frame)
                 self._telemetry.count("page_frames", fate="shown")
             time.sleep(max(begin_s + 1.0 / FRAMES_HZ - time.monotonic(), 0.0))
 
-    def _tell(self, ours: Connection, what: str, content: Any) -> None:
-        parcel = pack(what, content)
-        with self._telling, contextlib.suppress(OSError, ValueError):  # it has ended; who listens to it notices
-            ours.send_bytes(parcel)
+    def _send_message(self, ours: Connection, what: str, content: Any) -> None:
+        message = pack(what, content)
+        with self._sending, contextlib.suppress(OSError, ValueError):  # the process has ended, which `_receive` notices
+            ours.send_bytes(message)
 
 
 def frame_of(actor: Actor, tick: Tick, steps: Mapping[Side, HandStep], message: HandsMessage) -> Frame:
-    """All there is to see of one tick of an actor."""
+    """Everything that the page shows of one tick of an actor."""
     props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
     windows = {name: body.window for name, body in tick.bodies.items()}
     hands: dict[Side, HandView] = {}
@@ -181,7 +184,7 @@ def _prop(prop: Prop, offset: Array) -> PropView:
 
 
 def _page(connection: Connection, listener: socket.socket, hand_file: Path) -> None:
-    from manipnet.page.app import serve  # what it needs is of no use to the server itself
+    from manipnet.page.app import serve  # the server itself does not need its libraries
 
     serve(listener, connection, hand_file)
 

@@ -1,4 +1,4 @@
-"""A viser server that only answers whom it should: on a socket that is given, to pages of its own, without a tunnel."""
+"""A viser server on a given socket, without a public tunnel, that admits only pages of its own."""
 
 import asyncio
 import contextlib
@@ -20,9 +20,9 @@ from manipnet.net.addresses import is_loopback
 from manipnet.outputs.websocket.server import LOCAL_PAGES
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
-"""Whether the connection being served may change anything: a page of this machine, looked at on this machine."""
+"""Whether the current connection may change anything, which needs a page and a visitor on this machine."""
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
-"""What the page adds to viser's own: a title, and files that are dropped on it."""
+"""The script that the page adds to viser's client: a title, and the import of dropped files."""
 DROP_PATH: Final = "/drop"
 _POLICY_VIOLATION: Final = 1008
 
@@ -30,17 +30,17 @@ Dropped = Callable[[str, bytes], str]
 
 
 class Server(viser.ViserServer):
-    """Viser without its public tunnel, which any visitor could open otherwise."""
+    """Viser without its public tunnel, which any visitor could open."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Nothing is shared."""
+        """Open no tunnel."""
         return None
 
 
 def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server:
-    """Serve on a socket that already listens; on loopback only pages of this machine come in.
+    """Serve on a socket that already listens; on loopback, only pages of this machine are admitted.
 
-    `dropped` is given the name and content of a file an operator dropped on the page, and says what became of it.
+    `dropped` receives the name and content of a file that an operator dropped on the page, and returns a message.
     """
     with _served_on(listener, dropped):
         return Server(host="127.0.0.1", port=0, label=label, verbose=False)
@@ -48,7 +48,7 @@ def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server
 
 @contextlib.contextmanager
 def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
-    """Viser has neither an option for a socket nor one for origins, so what it calls is stood in for."""
+    """Replace the function with which viser serves, which has no option for a socket or for allowed origins."""
     original = websockets.asyncio.server.serve
     exposed = not is_loopback(listener.getsockname()[0])
 
@@ -56,16 +56,16 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
         async def handle(connection: ServerConnection) -> None:
             request = connection.request
             assert request is not None
-            OPERATOR.set(may_act(connection.remote_address[0], request.headers))
+            OPERATOR.set(may_operate(connection.remote_address[0], request.headers))
             if urlsplit(request.path).path == DROP_PATH:
-                await _take_in(connection, request, dropped)
+                await _receive_file(connection, request, dropped)
             else:
                 await handler(connection)
 
         def answer(connection: ServerConnection, request: Request) -> Response | None:
-            if not may_look(request.headers, exposed):
-                return connection.respond(HTTPStatus.FORBIDDEN, "This page is not for other web sites.\n")
-            with contextlib.suppress(KeyError):  # the script is put into what has not been compressed
+            if not may_view(request.headers, exposed):
+                return connection.respond(HTTPStatus.FORBIDDEN, "Other web sites may not use this page.\n")
+            with contextlib.suppress(KeyError):  # the script can only be added to an uncompressed page
                 del request.headers["Accept-Encoding"]
             response = process_request(connection, request)
             return _with_script(response) if urlsplit(request.path).path == "/" else response
@@ -79,9 +79,9 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
         websockets.asyncio.server.serve = original  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def may_look(headers: Any, exposed: bool) -> bool:
-    """Whether a request comes from a page of this machine, from no page at all or, where other machines are let in,
-    from the page itself: no other web site open in the same browser may."""
+def may_view(headers: Any, exposed: bool) -> bool:
+    """Whether a request is admitted: one from a page of this machine, from a program that is not a page or, if other
+    machines are admitted, from the page itself. Other web sites in the same browser are not admitted."""
     origin, host = headers.get("Origin"), headers.get("Host", "")
     local = LOCAL_PAGES.fullmatch(f"http://{host}") is not None
     if origin is None:
@@ -89,15 +89,15 @@ def may_look(headers: Any, exposed: bool) -> bool:
     return (local and LOCAL_PAGES.fullmatch(origin) is not None) or (exposed and origin == f"http://{host}")
 
 
-def may_act(address: str, headers: Any) -> bool:
-    """Whether a visitor may change anything: one on this machine, through an address of this machine only."""
-    return is_loopback(address) and may_look(headers, exposed=False)
+def may_operate(address: str, headers: Any) -> bool:
+    """Whether a visitor may change anything: only on this machine, through a loopback address."""
+    return is_loopback(address) and may_view(headers, exposed=False)
 
 
-async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
-    """One file: its name in the query, its content the only message."""
+async def _receive_file(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
+    """Receive one dropped file, with its name in the query and its content in the only message."""
     if not OPERATOR.get():
-        await connection.close(_POLICY_VIOLATION, "only the server's own machine may bring in files")
+        await connection.close(_POLICY_VIOLATION, "only a visitor on the server's own machine can import files")
         return
     name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
     with contextlib.suppress(ConnectionClosed):
