@@ -33,6 +33,7 @@ class Actor:
         self.seq = 0
         """Number of the next message."""
         self.paused = False
+        """Whether both hands stay as they are shown."""
         self.model_hand = bundle.hand
         """The hand that is synthesised, of size 1."""
         limits = _limits(config, bundle)
