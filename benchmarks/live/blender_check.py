@@ -7,6 +7,8 @@ example `manipnet-serve --demo`. Blender without a window does not run timers, s
 extension's timer.
 """
 
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+
 import math
 import os
 import sys
@@ -14,14 +16,14 @@ import tempfile
 import time
 from pathlib import Path
 
-import bpy  # pyright: ignore[reportMissingImports]
+import bpy
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "clients" / "blender"))
-import package  # pyright: ignore[reportMissingImports]
+import package
 
 sys.path.insert(0, str(package.write_unpacked(Path(tempfile.mkdtemp())).parent))
-import manipnet_live  # pyright: ignore[reportMissingImports]
-from manipnet_live.session import session  # pyright: ignore[reportMissingImports]
+import manipnet_live
+from manipnet_live.session import session
 
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 KNUCKLES = ((0.04, 0.03), (0.1, 0.03), (0.105, 0.0), (0.1, -0.02), (0.09, -0.04))
