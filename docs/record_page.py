@@ -69,7 +69,7 @@ def set_up(page: Page) -> None:
     page.click("Takes", PATIENCE_S)
     page.wait_for(f"[...document.querySelectorAll('input')].some(field => field.value === '{TAKE}.mcap')", PATIENCE_S)
     page.click("Show this take", PATIENCE_S)
-    page.wait_for(f"{TEXT}.includes('Time (s)')", PATIENCE_S)
+    page.wait_for(f"{TEXT}.includes('Second')", PATIENCE_S)
     x, y = 420.0, 250.0
     for _ in range(ZOOM_STEPS):
         page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-100)
@@ -86,7 +86,7 @@ def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> No
 
 def picture(page: Page, second: float) -> Image.Image:
     """What the page looks like at an instant of the recording."""
-    page.type("Time (s)", f"{second:.2f}")
+    page.type("Time, s", f"{second:.2f}")
     time.sleep(0.7)  # the browser draws once or twice in this time
     page.evaluate("document.activeElement.blur()")
     screenshot = base64.b64decode(page.call("Page.captureScreenshot")["data"])

@@ -8,6 +8,7 @@ extension's timer.
 """
 
 import math
+import os
 import sys
 import tempfile
 import time
@@ -85,8 +86,10 @@ def main():
     manipnet_live.unregister()
     print(
         f"Blender {bpy.app.version_string}: {stats.received} frames received, {stats.lost} lost, "
-        f"{frames} frames keyed on {len(keys)} curves, {len(seen)} different poses of a bone, {len(places)} of a wrist"
+        f"{frames} frames keyed on {len(keys)} curves, {len(seen)} different poses of a bone, {len(places)} of a wrist",
+        flush=True,
     )
 
 
 main()
+os._exit(0)  # the module of PyPI 4.5 hangs in its own cleanup when the interpreter exits normally

@@ -1,5 +1,5 @@
-// The sender's clock, seen from here. The offset is a critically damped spring to the least "arrival minus capture time"
-// of about the last second, so neither jitter nor a better estimate makes a step.
+// An estimate of the sender's clock. The offset is a critically damped spring towards the smallest difference of
+// arrival and capture time in about the last second, so neither jitter nor a better estimate makes a step.
 const WINDOW = 64;
 const STIFFNESS_HZ = 2;
 const SNAP_S = 0.25;
@@ -31,7 +31,7 @@ export class SmoothClock {
     this.#count++;
   }
 
-  /** The sender's time at the local time `now`, which must not fall between calls. */
+  /** The sender's time at the local time `now`, which must not decrease between calls. */
   captureTime(now) {
     const step = Math.max(now - this.#now, 0);
     this.#now = Math.max(now, this.#now);

@@ -1,5 +1,5 @@
-// Both hands as spheres on their WebXR joints, lines along the bones, and the tracked bodies. The stream's axes are
-// three.js's own: right-handed, Y up, metres. `?server=ws://HOST:PORT` names another server.
+// Shows both hands as spheres at their WebXR joints with lines along the bones, and the tracked bodies. The stream has
+// the axes of three.js: right-handed, Y up, metres. `?server=ws://HOST:PORT` names another server.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { JOINT_PARENTS, ManipNetClient } from "./manipnet.js";
@@ -22,7 +22,7 @@ controls.target.set(0, 1, 0);
 
 const hands = Object.fromEntries(Object.entries(SIDES).map(([side, color]) => [side, makeHand(color)]));
 const bodies = new Map();
-let followed = false;
+let hasLooked = false;
 
 function makeHand(color) {
   const material = new THREE.MeshStandardMaterial({ color, roughness: 0.6 });
@@ -64,18 +64,18 @@ function showBody(body) {
   axes.quaternion.fromArray(body.pose, 3);
 }
 
-/** Look at the hands once, wherever the stage's origin is. */
+/** Points the camera at the hands once, because the origin may be far from them. */
 function lookAtHands({ left, right }) {
   const hand = left.present ? left : right;
-  if (followed || !hand.present) return;
-  followed = true;
+  if (hasLooked || !hand.present) return;
+  hasLooked = true;
   controls.target.fromArray(hand.wrist);
   camera.position.copy(controls.target).add(new THREE.Vector3(-0.1, 0.3, 0.55));
 }
 
 function describe() {
   const s = client.stats();
-  if (s.received === 0) return `${server}: ${s.state}\nNothing has arrived: does manipnet-serve run?`;
+  if (s.received === 0) return `${server}: ${s.state}\nNothing has arrived. Is manipnet-serve running?`;
   const sides = Object.keys(SIDES).filter((side) => client.hands[side].present);
   const states = sides.map((side) => {
     const { state, object } = client.hands[side];

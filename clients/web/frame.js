@@ -1,4 +1,4 @@
-// One message in memory that is used again and again. Right-handed, Y up, metres, radians, quaternions xyzw.
+// One message, in memory that is reused. Axes are right-handed with Y up; metres, radians, quaternions xyzw.
 import * as L from "./layout.js";
 
 export const SIDES = ["left", "right"];
@@ -7,15 +7,15 @@ const utf8 = new TextDecoder("utf-8", { fatal: true });
 export class HandFrame {
   present = false;
   state = "live";
-  /** Name of the body the fingers belong to, or null. */
+  /** The name of the body near the hand, or null. */
   object = null;
   scale = 1;
   angles = new Float32Array(L.ANGLE_COUNT);
-  /** 17 quaternions local to the parent bone. */
+  /** 17 quaternions relative to the parent bone. */
   rotations = new Float32Array(4 * L.BONE_COUNT);
-  /** World position and quaternion. */
+  /** Position and quaternion in the world. */
   wrist = new Float32Array(7);
-  /** 26 joints, world position and quaternion each, in the order of JOINT_NAMES. */
+  /** Position and quaternion in the world of each of 26 joints, in the order of JOINT_NAMES. */
   joints = new Float32Array(7 * L.JOINT_COUNT);
 
   copyFrom(other) {
@@ -49,12 +49,12 @@ export class HandsFrame {
   tCapture = 0;
   tPublish = 0;
   lookAhead = 0;
-  /** buffer, sense, infer, ik, total */
+  /** The times buffer, sense, infer, ik and total. */
   latencyMs = new Float32Array(5);
   left = new HandFrame();
   right = new HandFrame();
   bodyCount = 0;
-  /** Only the first bodyCount count. */
+  /** Only the first bodyCount bodies are valid. */
   bodies = [];
 
   setBodyCount(count) {
@@ -77,14 +77,14 @@ export class HandsFrame {
   }
 }
 
-/** Read the payload of `pose/bin` (an ArrayBuffer) into `frame`; throws an Error that says what was wrong. */
+/** Decodes the payload of `pose/bin` (an ArrayBuffer) into `frame`; throws an Error that says what is wrong. */
 export function decode(buffer, frame) {
-  if (buffer.byteLength < L.HEADER_BYTES) throw new Error("not a pose/bin message: it is shorter than a header");
+  if (buffer.byteLength < L.HEADER_BYTES) throw new Error("the message is not pose/bin; it is shorter than a header");
   const view = new DataView(buffer);
-  if (view.getUint32(0, true) !== L.MAGIC) throw new Error("not a pose/bin message: it must start with MNPL");
+  if (view.getUint32(0, true) !== L.MAGIC) throw new Error("the message is not pose/bin; it must begin with MNPL");
   const version = view.getUint16(L.HEADER_VERSION, true);
   if (version !== L.VERSION) {
-    throw new Error(`message is of version ${version}; this reader understands version ${L.VERSION}`);
+    throw new Error(`the message has version ${version}; this client understands version ${L.VERSION}`);
   }
   const headerSize = view.getUint16(L.HEADER_HEADER_SIZE, true);
   const handSize = view.getUint16(L.HEADER_HAND_SIZE, true);
@@ -95,11 +95,11 @@ export function decode(buffer, frame) {
     throw new Error("a record is shorter than its fields");
   }
   if (hands > 2 || bodies > L.MAX_BODIES) {
-    throw new Error(`${hands} hands and ${bodies} bodies; 2 and ${L.MAX_BODIES} are allowed`);
+    throw new Error(`the message has ${hands} hands and ${bodies} bodies; at most 2 and ${L.MAX_BODIES} are allowed`);
   }
   const total = headerSize + hands * handSize + bodies * bodySize;
   if (buffer.byteLength !== total || view.getUint32(L.HEADER_TOTAL_SIZE, true) !== total) {
-    throw new Error(`message has ${buffer.byteLength} bytes; its header promises ${total}`);
+    throw new Error(`the message has ${buffer.byteLength} bytes, but its header says ${total}`);
   }
   readHeader(view, frame);
   for (let i = 0; i < hands; i++) readHand(view, headerSize + i * handSize, frame);
@@ -122,10 +122,10 @@ function readHeader(view, frame) {
 function readHand(view, at, frame) {
   const side = view.getUint8(at + L.HAND_SIDE);
   const state = view.getUint8(at + L.HAND_STATE);
-  if (side > 1) throw new Error(`side is ${side}; allowed are 0 (left) and 1 (right)`);
-  if (state >= L.STATES.length) throw new Error(`state is ${state}; allowed are 0 to 2 (${L.STATES.join(", ")})`);
+  if (side > 1) throw new Error(`the side is ${side}; allowed are 0 (left) and 1 (right)`);
+  if (state >= L.STATES.length) throw new Error(`the state is ${state}; allowed are 0 to 2 (${L.STATES.join(", ")})`);
   const hand = frame[SIDES[side]];
-  if (hand.present) throw new Error(`the ${SIDES[side]} hand occurs twice; once is allowed`);
+  if (hand.present) throw new Error(`the ${SIDES[side]} hand occurs twice; it may occur once`);
   const name = readName(view, at + L.HAND_OBJECT, hand.object ?? "");
   hand.present = true;
   hand.state = L.STATES[state];
@@ -148,7 +148,7 @@ function readFloats(view, at, into) {
 }
 
 function finite(value) {
-  if (!Number.isFinite(value)) throw new Error("the message holds a number that is not finite");
+  if (!Number.isFinite(value)) throw new Error("the message has a number that is not finite");
   return value;
 }
 
@@ -163,7 +163,7 @@ function readName(view, at, known) {
   }
 }
 
-/** Most names are the last message's and plain ASCII: no need for a new string then. */
+/** Whether the name is unchanged and ASCII, as most are; then no new string is needed. */
 function isSame(view, at, known) {
   for (let i = 0; i < known.length; i++) {
     const byte = view.getUint8(at + i);

@@ -1,4 +1,4 @@
-// Shows hands smoothly at any display rate: by capture time, a chosen delay behind, held then faded on loss.
+// Interpolates hands by capture time, a chosen delay behind, for any display rate; holds and then fades them on loss.
 import { SmoothClock } from "./clock.js";
 import { HandsFrame } from "./frame.js";
 import { RATE_HZ } from "./layout.js";
@@ -13,11 +13,11 @@ const STALE_LIMIT_S = 0.5;
 
 export class Interpolator {
   delayS;
-  /** Frames that came too late to be of use. */
+  /** The number of frames that came too late to be shown. */
   late = 0;
-  /** What the last call of `sample` made. */
+  /** The result of the last call of `sample`. */
   output = new HandsFrame();
-  /** Falls from 1 to 0 when the stream is lost: mix your own animation in by it. */
+  /** Falls from 1 to 0 when the stream is lost; use it to blend to another animation. */
   weight = 0;
   #ring = new Ring();
   #clock = new SmoothClock();
@@ -40,7 +40,7 @@ export class Interpolator {
     this.delayS = delayS;
   }
 
-  /** Hand over a frame that arrived at the local time `arrival` (seconds), and get one to fill next. */
+  /** Adds a frame that arrived at the local time `arrival` (seconds), and returns a frame to fill next. */
   push(frame, arrival) {
     if (!this.#accept(frame, arrival)) {
       this.late++;
@@ -53,7 +53,7 @@ export class Interpolator {
     return this.#ring.exchange(this.#gridOf(frame.tCapture), frame);
   }
 
-  /** Set `output` and `weight` for the local time `now`, which must not fall. False before the first frame. */
+  /** Sets `output` and `weight` for the local time `now`, which must not decrease. False before the first frame. */
   sample(now) {
     if (this.#session === null) return false;
     const position = (this.#clock.captureTime(now) - this.delayS - this.#t0) * RATE_HZ;
@@ -78,7 +78,7 @@ export class Interpolator {
     return true;
   }
 
-  /** Another session, or the sender's clock set back, as when a take loops. */
+  /** Begins anew, for a new session or after the sender's clock went back, as when a take loops. */
   #restart(frame) {
     this.#ring.clear();
     this.#clock.reset();
@@ -87,7 +87,7 @@ export class Interpolator {
     this.#starved = this.#hasShown;
   }
 
-  /** Backlog after a stall; but if everything is late for long, it is the clock that has changed. */
+  /** Whether the frame is backlog after a stall; if frames stay late for long, the clock has changed instead. */
   #isStale(frame, arrival) {
     if (arrival - frame.tCapture - this.#clock.target <= STALE_S) {
       this.#staleSince = Number.NaN;
@@ -99,7 +99,7 @@ export class Interpolator {
     return false;
   }
 
-  /** After a gap, glide from the pose that was held to the stream. */
+  /** Blends with the held pose for a short time after a gap. */
   #ease(starved, now) {
     if (starved > 1 / RATE_HZ) {
       this.#starved = true;

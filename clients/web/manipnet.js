@@ -1,4 +1,4 @@
-// Receive the fingers of ManipNet Live in a browser.
+// Receives hands from ManipNet Live in a browser.
 //
 //   const client = new ManipNetClient("ws://127.0.0.1:8081");
 //   function draw() {
@@ -17,7 +17,7 @@ const BACK_OFF_MS = 100;
 const BACK_OFF_LIMIT_MS = 1000;
 const DEAD_AFTER_MS = 5000;
 
-/** Receives the hands of one actor (the first seen, unless named) and reconnects by itself. */
+/** Receives the hands of one actor (the first one received, if none is named) and reconnects by itself. */
 export class ManipNetClient {
   #address;
   #actor;
@@ -31,14 +31,14 @@ export class ManipNetClient {
   #closed = false;
   #session = null;
   #seq = 0;
-  #heardMs = 0;
+  #receivedMs = 0;
   #newestAt = -Infinity;
   #counts = { state: "connecting", received: 0, lost: 0, refused: 0, connections: 0 };
 
-  /** `address`: as the server's `ready` line tells it, "ws://HOST:PORT". Throws for one that is none. */
+  /** `address` is "ws://HOST:PORT", from the server's line `ready`. Throws an Error for any other form. */
   constructor(address, { actor = null, delayS = 0.1 } = {}) {
     if (!/^wss?:\/\/[^/]+/.test(address)) {
-      throw new Error(`address is "${address}"; allowed is ws://HOST:PORT, as in ws://127.0.0.1:8081`);
+      throw new Error(`the address is "${address}"; allowed is ws://HOST:PORT, as in ws://127.0.0.1:8081`);
     }
     this.#address = address;
     this.#actor = actor;
@@ -47,22 +47,22 @@ export class ManipNetClient {
     this.#connect();
   }
 
-  /** What `sample` made: a HandsFrame that the next call overwrites. */
+  /** The result of `sample`, a HandsFrame that the next call overwrites. */
   get hands() {
     return this.#interpolator.output;
   }
 
-  /** Falls from 1 to 0 when the stream is lost: mix your own animation in by it. */
+  /** Falls from 1 to 0 when the stream is lost; use it to blend to another animation. */
   get weight() {
     return this.#interpolator.weight;
   }
 
-  /** Set `hands` and `weight` for now (seconds of performance.now). False before the first frame. */
+  /** Sets `hands` and `weight` for `now` (seconds of performance.now). Returns false before the first frame. */
   sample(nowS = performance.now() / 1000) {
     return this.#interpolator.sample(nowS);
   }
 
-  /** Counters and rates: state, received, late, lost, refused, connections, seq (of the newest), rateHz, ageS. */
+  /** The state and the counters: received, late, lost, refused, connections, seq (of the newest), rateHz, ageS. */
   stats() {
     const now = performance.now() / 1000;
     const known = this.#arrivals.subarray(0, Math.min(this.#counts.received, RATE_HZ));
@@ -81,11 +81,11 @@ export class ManipNetClient {
   }
 
   #connect() {
-    this.#heardMs = performance.now();
+    this.#receivedMs = performance.now();
     const socket = new WebSocket(this.#address);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
-      this.#heardMs = performance.now();
+      this.#receivedMs = performance.now();
       this.#counts.connections++;
       this.#counts.state = "connected";
     };
@@ -97,23 +97,23 @@ export class ManipNetClient {
   }
 
   #retry(socket) {
-    if (this.#closed || socket !== this.#socket) return; // an error may or may not be followed by a close
+    if (this.#closed || socket !== this.#socket) return; // a close event may follow an error
     this.#socket = null;
     this.#counts.state = "reconnecting";
     this.#timer = setTimeout(() => this.#connect(), this.#waitMs);
     this.#waitMs = Math.min(2 * this.#waitMs, BACK_OFF_LIMIT_MS);
   }
 
-  /** A server that vanished without a word leaves the socket open for minutes; one that never answers, opening. */
+  /** Reconnects after silence, because the socket of a vanished server stays open, or opening, for minutes. */
   #checkAlive() {
     const socket = this.#socket;
-    if (socket === null || performance.now() - this.#heardMs < DEAD_AFTER_MS) return;
+    if (socket === null || performance.now() - this.#receivedMs < DEAD_AFTER_MS) return;
     this.#retry(socket);
     socket.close();
   }
 
   #take(data, arrival) {
-    this.#heardMs = 1000 * arrival;
+    this.#receivedMs = 1000 * arrival;
     try {
       decode(data, this.#spare);
     } catch (error) {

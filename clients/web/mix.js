@@ -1,7 +1,7 @@
-// Weighted means of frames: numbers linearly, quaternions by their normalised sum.
+// Weighted means of frames; quaternions are summed and normalised.
 import { SIDES } from "./frame.js";
 
-/** Mix into `output`; names, states and the like come from `frames[reference]`. */
+/** Writes the mean to `output`; names, states and the like come from `frames[reference]`. */
 export function mix(frames, weights, reference, output) {
   output.copyFrom(frames[reference]);
   for (const side of SIDES) mixHand(frames, weights, side, output[side]);
@@ -14,7 +14,7 @@ const parts = [];
 function mixHand(frames, weights, side, output) {
   if (!output.present) return;
   for (let k = 0; k < frames.length; k++) {
-    if (weights[k] !== 0 && !frames[k][side].present) return; // it comes or goes: nothing to mix with
+    if (weights[k] !== 0 && !frames[k][side].present) return; // it appears or disappears, so it is not in all frames
   }
   gatherHand(frames, weights, side, "angles");
   numbers(output.angles, 0, 1, 1);
@@ -61,7 +61,7 @@ function numbers(output, first, stride, width) {
   }
 }
 
-/** `output` still holds the reference, whose half of the sphere the others are brought to. */
+/** Sums quaternions, each with the sign that is nearer to the reference, which `output` still holds. */
 function quaternions(output, first, stride) {
   for (let i = first; i < output.length; i += stride) {
     let x = 0;

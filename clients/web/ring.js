@@ -1,6 +1,7 @@
-// The last frames on the 60 Hz grid of their capture times, and how much of each makes up an instant between them: a
-// uniform cubic B-spline, whose acceleration never exceeds the frames' own second differences. Lost frames are filled
-// from two neighbours on each side; beyond the ends it goes straight on.
+// The last frames on the 60 Hz grid of their capture times, and the weights of frames that show an instant between
+// them. The weights are those of a uniform cubic B-spline, whose acceleration never exceeds the frames' second
+// differences. A lost frame is replaced by the cubic through two neighbours on each side, and beyond the ends the first
+// or last two frames are continued in a straight line.
 import { HandsFrame } from "./frame.js";
 
 export const RING_SIZE = 32;
@@ -18,7 +19,7 @@ export class Ring {
     this.#empty = true;
   }
 
-  /** Put a frame in its place and get another one, free to be overwritten. */
+  /** Stores a frame and returns another one, which may be overwritten. */
   exchange(grid, frame) {
     const slot = slotOf(grid);
     const free = this.frames[slot];
@@ -34,7 +35,7 @@ export class Ring {
     return free;
   }
 
-  /** Set `weights` for a position on the grid; returns the slot of the nearest frame. */
+  /** Sets `weights` for a position on the grid and returns the slot of the nearest frame. */
   weigh(position) {
     this.weights.fill(0);
     position = Math.min(Math.max(position, this.#first), this.#last);
@@ -78,7 +79,7 @@ export class Ring {
     }
   }
 
-  /** The polynomial through up to two frames on each side of a lost one. */
+  /** Adds a lost frame by the polynomial through up to two frames on each side of it. */
   #fill(index, weight) {
     const nodes = this.#nodes;
     const count = this.#collect(index, 1, this.#collect(index, -1, 0));

@@ -15,11 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba import njit, types
 from numba.core import cgutils, config
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
+from numba.np.numpy_support import as_dtype
 from platformdirs import user_cache_dir
+
+from manipnet.common import kernel_cache
 
 kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # pyright: ignore
 """A compiled function that Python calls: cached on disk, without the interpreter's lock, x / 0 as NumPy has it.
@@ -34,11 +38,14 @@ the compiling."""
 def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
     """A function for kernels that gives an array of this shape to work in, unfilled and gone when they return.
 
-    One place for each call in the source, so an array made in a loop is the same one every time round.
+    One place for each call in the source, so an array made in a loop is the same one every time round. With
+    `NUMBA_DISABLE_JIT=1`, kernels are plain Python, and so is the array.
     """
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]: set at run time
+        return lambda: np.empty(shape, as_dtype(dtype))
 
     @intrinsic
-    def room(_):
+    def array_on_stack(_):
         kind = types.Array(dtype, len(shape), "C")
 
         def generate(context, builder, _signature, _arguments):
@@ -55,7 +62,7 @@ def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
 
         return kind(), generate
 
-    return room
+    return array_on_stack
 
 
 matrix, vector = stack_array(3, 3), stack_array(3)
@@ -72,6 +79,12 @@ def cached(name: str) -> bool:
     return not config.CACHE_DIR or any(Path(config.CACHE_DIR).rglob(f"*.{name}-*.nbi"))  # pyright: ignore
 
 
+def seal_cache() -> None:
+    """Note what is in the cache now that everything is compiled, so that the next start notices damage."""
+    if _own_folder is not None:
+        kernel_cache.seal_cache(_own_folder)
+
+
 def _package_state() -> str:
     package = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
@@ -82,9 +95,10 @@ def _package_state() -> str:
     return digest.hexdigest()[:16]
 
 
-def _use_own_cache() -> None:
+def _use_own_cache() -> Path | None:
+    """Choose the folder of the cache, and return it; None if numba's own choice stands."""
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return
+        return None
     root = Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False)) / "kernels"
     folder = root / _package_state()
     try:
@@ -93,9 +107,11 @@ def _use_own_cache() -> None:
         for old in root.iterdir():
             if time.time() - old.stat().st_mtime > _KEEP_S:
                 shutil.rmtree(old, ignore_errors=True)
+        kernel_cache.check_cache(folder)
     except OSError:
-        return  # numba then falls back to the folders it knows
+        return None  # numba then falls back to the folders it knows
     config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]: set at run time
+    return folder
 
 
-_use_own_cache()
+_own_folder = _use_own_cache()

@@ -28,6 +28,8 @@ from manipnet.common.options import (
     to_toml,
 )
 from manipnet.config.settings import ServerConfig, all_options, protocol_options
+from manipnet.synthesis.ik.pose import pose_kernel
+from manipnet.synthesis.ik.solvers import SOLVERS
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,13 @@ def test_the_help_has_every_option_with_its_default(capsys: pytest.CaptureFixtur
         assert f"{each.help} (default: {each.shown_default})" in text or not each.shown_default
 
 
+def test_every_solver_of_the_table_can_be_chosen_and_has_a_kernel() -> None:
+    solver = all_options()["solver"]
+    for name in SOLVERS:
+        assert solver.read(name, Path(), "--solver") == name
+        assert callable(pose_kernel(name))
+
+
 HEAVY = {
     "numpy",
     "numba",
@@ -198,4 +207,4 @@ def test_help_and_a_mistyped_option_answer_at_once(arguments: tuple[str, ...]) -
 
 def test_the_configuration_loads_neither_the_compiler_nor_the_network() -> None:
     heavy, _ = run_apart("--print-config")
-    assert heavy <= {"numpy", "tomlkit"}
+    assert heavy <= {"numpy", "tomlkit", "msgpack"}

@@ -70,7 +70,8 @@ def test_a_calibration_is_in_force_and_stored_and_the_next_one_changes_little(
     show(actors_proxy)
     answer = calibrate({"op": "calibrate"})
     assert answer["stored"] == str(rig)
-    for role in ("left_wrist", "right_wrist"):
+    for side in ("left", "right"):
+        role = f"{side}_wrist"
         for offset in (actors_proxy.actors[0].offset(role), load_rig(rig).actors[0].wrists[role].offset):
             assert offset is not None
             away_m, away_rad = difference(offset, CLUSTER)

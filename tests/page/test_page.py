@@ -1,4 +1,4 @@
-"""The live page in a real browser, against other web sites, and after its process dies."""
+"""The live page: in a real browser, towards strangers, and when its process dies."""
 
 import http.client
 import os
@@ -12,12 +12,12 @@ import pytest
 from browser import Page, browsing
 from live_server import LiveServer, serving
 
-from manipnet.page.web_server import may_operate, may_view
+from manipnet.page.web_server import may_act, may_look
 
 FINGERS = "[...document.querySelectorAll('canvas')].length > 0"
 TEXT = "document.body.innerText"
 PATIENCE_S = 240.0
-"""Enough for a browser that draws in software on a busy machine."""
+"""A browser that draws in software, on a busy machine."""
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def demo(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 
 
 def get(server: LiveServer, **headers: str) -> tuple[int, str]:
-    """Request the page; returns the status and the body."""
+    """Status and body of the page's address."""
     host = urlsplit(server.addresses["page"]).netloc
     connection = http.client.HTTPConnection(host, timeout=PATIENCE_S)
     try:
@@ -50,20 +50,20 @@ console.error = (...words) => complaints.push(words.join(' '));
 """
 
 
-def test_the_page_shows_hands_and_imports_a_mesh_without_errors(demo: LiveServer, tmp_path: Path) -> None:
+def test_the_page_shows_hands_swaps_an_object_and_complains_of_nothing(demo: LiveServer, tmp_path: Path) -> None:
     chromium = shutil.which("chromium")
     if chromium is None:
         pytest.skip("needs chromium: apt-get install chromium")
     with browsing(chromium, demo.addresses["page"], tmp_path / "profile") as page:
         page.call("Runtime.enable")
-        # the first visit starts the page's process, after which the page reloads itself
+        # the first visit starts the page's process and is followed by a load of its own: listen there as well
         page.call("Page.enable")
         page.call("Page.addScriptToEvaluateOnNewDocument", source=LISTEN)
         page.evaluate(LISTEN)
         page.wait_for(f"{TEXT}.includes('hands/s') && document.title === 'ManipNet Live'", PATIENCE_S)
         page.wait_for(f"{FINGERS} && {TEXT}.includes('right_wrist')", PATIENCE_S)
         drop(page, "club.ply", Path(__file__).parents[2] / "server/manipnet/synthesis/objects/meshes/hammer.ply")
-        page.wait_for("document.getElementById('drop-note').textContent.includes('has the mesh club')", PATIENCE_S)
+        page.wait_for("document.getElementById('drop-note').textContent.includes('carries club')", PATIENCE_S)
         assert "club" in {prop["object"] for prop in carried(demo).values()}
         drop(page, "nonsense.obj", Path(__file__))
         page.wait_for("document.getElementById('drop-note').textContent.includes('nonsense.obj')", PATIENCE_S)
@@ -85,7 +85,7 @@ def drop(page: Page, name: str, file: Path) -> None:
     )
 
 
-def test_other_web_sites_and_other_host_names_are_refused(demo: LiveServer) -> None:
+def test_other_web_sites_and_other_names_of_this_machine_are_turned_away(demo: LiveServer) -> None:
     host = urlsplit(demo.addresses["page"]).netloc
     status, body = get(demo)
     assert status == 200
@@ -96,7 +96,7 @@ def test_other_web_sites_and_other_host_names_are_refused(demo: LiveServer) -> N
 
 
 @pytest.mark.parametrize(
-    ("address", "headers", "exposed", "views", "operates"),
+    ("address", "headers", "exposed", "looks", "acts"),
     [
         ("127.0.0.1", {"Host": "127.0.0.1:8080", "Origin": "http://127.0.0.1:8080"}, False, True, True),
         ("127.0.0.1", {"Host": "localhost:9000", "Origin": "http://localhost:9000"}, False, True, True),
@@ -109,15 +109,13 @@ def test_other_web_sites_and_other_host_names_are_refused(demo: LiveServer) -> N
         ("::ffff:127.0.0.1", {"Host": "[::1]:8080", "Origin": "http://[::1]:8080"}, False, True, True),
     ],
 )
-def test_who_may_view_and_who_may_operate(
-    address: str, headers: dict, exposed: bool, views: bool, operates: bool
-) -> None:
-    assert may_view(headers, exposed) == views
-    assert may_operate(address, headers) == operates
+def test_who_may_look_and_who_may_act(address: str, headers: dict, exposed: bool, looks: bool, acts: bool) -> None:
+    assert may_look(headers, exposed) == looks
+    assert may_act(address, headers) == acts
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the page's process in /proc")
-def test_a_page_that_dies_is_counted_and_starts_again_with_the_next_visit(demo: LiveServer) -> None:
+def test_a_page_that_dies_is_counted_and_comes_back_with_the_next_visit(demo: LiveServer) -> None:
     assert get(demo)[0] == 200
     (page,) = [pid for pid in children(demo.process.pid) if b"spawn_main" in command(pid)]
     os.kill(page, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""Every control of the live page, clicked in a real browser, and its effect on the server."""
+"""Every control of the live page, clicked in a real browser, and what the server makes of it."""
 
 import contextlib
 import shutil
@@ -20,7 +20,7 @@ from manipnet.recording.mcap_file import read_hands
 from manipnet.wire import HandsMessage
 
 PATIENCE_S = 240.0
-"""Enough for a browser that draws in software on a busy machine."""
+"""A browser that draws in software, on a busy machine."""
 TEXT = "document.body.innerText"
 RIG = """
 bodies.left_wrist = "left_wrist"
@@ -32,7 +32,7 @@ mesh = "cube"
 WRISTS: dict[Side, np.ndarray] = {
     side: compose(sheet_at(np.zeros(3), 0.0), wrist_on_sheet(side)) for side in ("left", "right")
 }
-"""The wrists are on the sheet, at the world's origin."""
+"""Where the wrists are: on the sheet, at the world's origin."""
 T_CLUSTER_WRIST = np.concatenate([[0.02, 0.03, -0.01], quat_exp(np.array([0.4, -0.8, 0.3]))])
 BOX = np.array([0.05, 0.1, 0.05, 0.0, 0.0, 0.0, 1.0])
 COMPLAIN = """
@@ -43,26 +43,26 @@ console.error = (...words) => complaints.push(words.join(' '));
 
 
 class Studio:
-    """A server with a rig and bodies that lie still, its messages, and its page in a browser."""
+    """A server with a rig, bodies that lie still, what it publishes, and its page in a browser."""
 
     def __init__(self, server: LiveServer, page: Page, rig: Path, takes: Path) -> None:
         self.server, self.page, self.rig, self.takes = server, page, rig, takes
         self.subscriber = Subscriber(server.addresses["hands"])
 
     def until(self, fulfilled: Callable[[HandsMessage], Any]) -> HandsMessage:
-        """The next message for which `fulfilled` is true."""
+        """The first message from now on that is as wanted."""
         while not fulfilled(message := self.subscriber.next()):
             pass
         return message
 
     def says(self, text: str) -> None:
-        """Wait until the page contains a text."""
+        """Wait until the page says so."""
         self.page.wait_for(f"{TEXT}.includes({text!r})", PATIENCE_S)
 
 
 @contextlib.contextmanager
 def lying_still(server: LiveServer) -> Iterator[None]:
-    """Send hands on the sheet and a box beside them, 120 times a second."""
+    """Hands on the sheet and a box beside them, 120 times a second."""
     sender, ended = Sender(server.addresses["bodies"]), threading.Event()
     clusters = {f"{side}_wrist": compose(wrist, invert(T_CLUSTER_WRIST)) for side, wrist in WRISTS.items()}
 
@@ -105,7 +105,7 @@ def studio(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Itera
         studio.subscriber.close()
 
 
-def test_pause_resume_and_rest(studio: Studio) -> None:
+def test_pause_go_on_and_rest(studio: Studio) -> None:
     def are(state: str) -> Callable[[HandsMessage], bool]:
         return lambda message: {hand.state for hand in message.hands.values()} == {state}
 
@@ -120,8 +120,8 @@ def test_pause_resume_and_rest(studio: Studio) -> None:
     studio.until(are("live"))
 
 
-def test_look_ahead_and_overlays(studio: Studio) -> None:
-    studio.page.type("Look-ahead (ms)", "100")
+def test_look_ahead_and_layers(studio: Studio) -> None:
+    studio.page.type("Look-ahead, ms", "100")
     studio.until(lambda message: message.look_ahead == pytest.approx(0.1))
     studio.says("100 ms look-ahead")
     for label in OVERLAYS.values():
@@ -133,7 +133,7 @@ def test_look_ahead_and_overlays(studio: Studio) -> None:
         studio.page.tick(label)
 
 
-def test_an_object_is_selected_scaled_and_placed(studio: Studio) -> None:
+def test_an_object_is_chosen_sized_and_placed(studio: Studio) -> None:
     def box() -> dict[str, Any]:
         return studio.server.ask({"op": "objects"})["bodies"]["actor"]["Box"]
 
@@ -141,22 +141,22 @@ def test_an_object_is_selected_scaled_and_placed(studio: Studio) -> None:
     studio.page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'Box')", PATIENCE_S)
     studio.page.choose("Object", "sphere")
     studio.until(lambda _: box()["object"] == "sphere")
-    studio.page.type("Scale", "1.5")
+    studio.page.type("Size", "1.5")
     studio.until(lambda _: box()["scale"] == 1.5)
-    studio.page.type("Position (mm)", "40", number=1)
+    studio.page.type("Position, mm", "40", number=1)
     moved = studio.until(lambda message: pose_of(message, "Box")[1] > BOX[1] + 0.03)
     np.testing.assert_allclose(pose_of(moved, "Box")[:3], BOX[:3] + np.array([0.0, 0.04, 0.0]), atol=1e-9)
-    studio.page.type("Rotation (°)", "90", number=1)
+    studio.page.type("Rotation, °", "90", number=1)
     studio.until(lambda message: abs(pose_of(message, "Box")[4]) > 0.7)
     studio.page.tick("Drag to move")
-    (saved,) = tomllib.loads(studio.rig.read_text())["objects"]
-    np.testing.assert_allclose(saved["position"], [0.0, 0.04, 0.0])
-    studio.page.click("Place by the sheet")
+    (kept,) = tomllib.loads(studio.rig.read_text())["objects"]
+    np.testing.assert_allclose(kept["position"], [0.0, 0.04, 0.0])
+    studio.page.click("It stands on the sheet")
     placed = studio.until(lambda message: abs(pose_of(message, "Box")[0]) < 1e-6)
     np.testing.assert_allclose(pose_of(placed, "Box")[2:], [0.0, 0.0, 0.0, 0.0, 1.0], atol=1e-6)
 
 
-def test_a_take_is_recorded_shown_and_closed_again(studio: Studio) -> None:
+def test_a_take_is_recorded_shown_scrubbed_and_left_again(studio: Studio) -> None:
     studio.page.click("Takes")
     studio.page.click("Record")
     studio.page.click("Stop recording", PATIENCE_S)
@@ -165,26 +165,26 @@ def test_a_take_is_recorded_shown_and_closed_again(studio: Studio) -> None:
     assert sum(1 for _ in read_hands(take)) > 0
     studio.page.click("Show this take")
     studio.says(f"▶ {take.name}")
-    studio.page.type("Time (s)", "0.02")
+    studio.page.type("Time, s", "0.02")
     studio.page.click("Play")
-    studio.page.click("Stop", PATIENCE_S)
+    studio.page.click("Pause playback", PATIENCE_S)
     studio.page.click("Back to live")
     studio.says("● Live")
 
 
-def test_wrists_are_calibrated_and_the_quality_is_shown(studio: Studio) -> None:
+def test_wrists_are_calibrated_and_the_quality_is_told(studio: Studio) -> None:
     studio.page.click("Calibrate")
-    studio.page.click("Hands are on the marks")
-    studio.says("Good: the hands are 1.000 times the size of the model's")
-    studio.says("Saved in stage.toml")
-    studio.until(lambda message: all(is_there(message, side) for side in WRISTS))  # the hands ease there
-    saved = tomllib.loads(studio.rig.read_text())["bodies"]["left_wrist"]
-    found = np.array([*saved["position"], *saved["rotation"]])
+    studio.page.click("The hands are on the marks")
+    studio.says("Good: the hands are 1.000 times")
+    studio.says("stored in stage.toml")
+    studio.until(lambda message: all(is_there(message, side) for side in WRISTS))  # eased there, not at once
+    kept = tomllib.loads(studio.rig.read_text())["bodies"]["left_wrist"]
+    found = np.array([*kept["position"], *kept["rotation"]])
     assert difference(found, T_CLUSTER_WRIST)[0] < 1e-6
 
 
 def is_there(message: HandsMessage, side: Side) -> bool:
-    """Whether a hand has reached its wrist."""
+    """Whether a hand is where its wrist is."""
     away_m, away_rad = difference(message.hands[side].wrist, WRISTS[side])
     return away_m < 2e-3 and away_rad < np.radians(1.0)
 

@@ -1,4 +1,4 @@
-"""Messages between the server and its page: they arrive unchanged, and cannot carry code."""
+"""Between the server and its page: what goes in comes out, and nothing that could run."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def message() -> HandsMessage:
     )
 
 
-def test_a_frame_arrives_unchanged() -> None:
+def test_a_frame_arrives_as_it_was() -> None:
     rng = np.random.default_rng(1)
     view = HandView("Mug", *(rng.normal(size=shape) for shape in ((22,), (22, 3))))
     sent = Frame(
@@ -46,7 +46,7 @@ def test_a_frame_arrives_unchanged() -> None:
     assert (got.message.actor, got.message.seq, got.message.bodies[0].name) == ("anna", 7, "Mug")
 
 
-def test_a_shape_arrives_writable_and_with_its_types() -> None:
+def test_a_shape_arrives_writable_and_of_its_own_kind() -> None:
     faces = np.array([[0, 1, 2]], np.int32)
     _, got = unpack(pack("shape", ShapeView("mug", "abc", np.eye(3), faces)))
     assert (got.name, got.content_hash, got.faces.dtype) == ("mug", "abc", faces.dtype)
@@ -55,10 +55,10 @@ def test_a_shape_arrives_writable_and_with_its_types() -> None:
 
 
 @pytest.mark.parametrize("content", [("answer", (3, b"\x80")), ("watched", True), ("log", (30, "text"))])
-def test_plain_content_arrives_unchanged(content: tuple) -> None:
+def test_plain_content_passes(content: tuple) -> None:
     assert unpack(pack(*content)) == content
 
 
-def test_other_values_are_not_sent() -> None:
-    with pytest.raises(TypeError, match="Popen cannot be sent"):
+def test_what_is_no_part_of_the_conversation_is_not_sent() -> None:
+    with pytest.raises(TypeError, match="Popen has no place"):
         pack("frame", type("Popen", (), {})())

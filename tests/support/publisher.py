@@ -7,6 +7,7 @@ import time
 import numpy as np
 import zmq
 
+from manipnet.geometry import Side
 from manipnet.outputs.websocket.server import WebSocketPublisher
 from manipnet.telemetry import Telemetry
 from manipnet.wire import (
@@ -15,7 +16,6 @@ from manipnet.wire import (
     BodyPose,
     HandPose,
     HandsMessage,
-    Side,
     encode_binary,
     encode_msgpack,
 )

@@ -6,10 +6,10 @@ import numpy as np
 from make_vectors import messages
 from manipnet_client.retarget import BONES
 
-from manipnet.geometry import matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply
+from manipnet.geometry import Side, matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet.wire import HandsMessage, Side
+from manipnet.wire import HandsMessage
 
 HAND = shipped_hand()
 

@@ -7,7 +7,7 @@ class ExtType(NamedTuple):
     code: int
     data: bytes
 
-class UnpackException(Exception): ...
+class UnpackException(Exception): ...  # noqa: N818 (the library calls it so)
 
 def packb(o: Any, *, default: Callable[[Any], Any] | None = None) -> bytes: ...
 def unpackb(

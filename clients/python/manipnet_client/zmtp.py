@@ -31,7 +31,7 @@ def parse_address(address: str) -> tuple[str, int]:
     """Host and port of "tcp://host:port"; raises `ValueError`, whose text says what is allowed."""
     host, _, port = address.removeprefix("tcp://").rpartition(":")
     if not (address.startswith("tcp://") and host and port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise ValueError(f"address is {address!r}; allowed is tcp://HOST:PORT, as in tcp://127.0.0.1:5555")
+        raise ValueError(f"the address is {address!r}; allowed is tcp://HOST:PORT, as in tcp://127.0.0.1:5555")
     return host.strip("[]"), int(port)
 
 

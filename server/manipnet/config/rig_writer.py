@@ -59,15 +59,12 @@ def store(path: Path, actor: ActorConfig, backup: bool = True) -> Path:
         return replace_file(path, after, backup)
     except (OSError, ValueError, TOMLKitError, KeyError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise ConfigError(f"{path}: could not be changed ({reason}); add these lines yourself:\n{_lines(actor)}") from (
-            None
-        )
+        text = f"{path}: could not be changed ({reason}); add these lines yourself:\n{_lines(actor)}"
+        raise ConfigError(text) from None
 
 
 def replace_file(path: Path, text: str, backup: bool = True) -> Path:
-    """Write a file so that at any time either the old or the new one is there whole; the old one is kept beside it
-    if there is to be a `backup`. Returns the backup's path. Raises `OSError`.
-    """
+    """Replace a file as a whole, after copying it to its `backup`. Returns the path of the backup. Raises `OSError`."""
     kept = path.with_name(path.name + BACKUP_SUFFIX)
     with replacing(path) as file:
         file.write(text.encode("utf-8"))

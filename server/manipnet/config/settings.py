@@ -103,7 +103,7 @@ class ServerConfig:
     solver: str = option(
         DEFAULT_SOLVER,
         Choice(tuple(SOLVERS)),
-        "inverse kinematics that corrects the contacts; " + "; ".join(f"{s.name}: {s.help}" for s in SOLVERS.values()),
+        "inverse kinematics that corrects the contacts: " + ", ".join(f"{s.name} ({s.help})" for s in SOLVERS.values()),
         group=SYNTHESIS,
     )
     look_ahead_s: float = option(

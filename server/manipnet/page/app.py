@@ -69,7 +69,7 @@ class Page:
         """Import a mesh file that was dropped on the page; returns the message for its visitor."""
         panel = next((panel for panel in self._panels.values() if panel.objects is not None), None)
         if panel is None or panel.objects is None:
-            return "only a visitor on the server's own machine can import files"
+            return "only a browser on the server's own machine may import files, and none is open"
         try:
             return panel.objects.import_mesh(name, content)
         except (RefusedError, ValueError, OSError) as error:

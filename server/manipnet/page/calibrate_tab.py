@@ -1,4 +1,4 @@
-"""The tab that calibrates hands: the instructions, the position of the sheet, and the quality of the result."""
+"""The tab that calibrates the hands on a printed sheet, and shows how good the calibration is."""
 
 import time
 from pathlib import Path
@@ -9,53 +9,54 @@ import viser
 from manipnet.page.controls import Ask, Perform
 
 COUNTDOWN_S: Final = 3
-"""From the click to the request. It uses the last 2 s, in which the hand that clicked must already lie still."""
+"""From the click to the request. The request uses the last 2 s, in which the hand that clicked must lie still."""
 ORIGIN: Final = "at the world's origin"
-NO_ACTORS: Final[tuple[str, ...]] = ("actor",)
+PLACES: Final[tuple[str, ...]] = (ORIGIN,)
+NO_ACTOR: Final[tuple[str, ...]] = ("actor",)
 STEPS: Final = {
     "wrists": (
-        "**1.** Lay both hands flat on the calibration sheet, wrists on its marks and fingers along its lines.",
-        "Hands are on the marks",
+        "**1** Lay both hands flat on the calibration sheet: the wrists on its marks, the fingers along its lines.",
+        "The hands are on the marks",
         viser.Icon.HAND_STOP,
     ),
     "fingertips": (
-        "**2.** To measure their size, draw the hands back until the middle fingertips touch the centre line.",
-        "Fingertips touch the line",
+        "**2** To measure the size of the hands, draw them back until the middle fingertips touch the centre line.",
+        "The fingertips touch the line",
         viser.Icon.HAND_FINGER,
     ),
 }
-"""The instructions, the button's label and its icon, by step."""
+"""The text, the button and its icon for each step."""
 
 
 class CalibrateTab:
-    """Both steps of docs/calibration.md; each starts a countdown before its request."""
+    """The two steps of docs/calibration.md. Each runs a few seconds after the click."""
 
     def __init__(self, ask: Ask, gui: viser.GuiApi, perform: Perform) -> None:
         self._ask = ask
         self._props: dict[str, tuple[str, ...]] = {}
-        """Names of props, by actor."""
-        self._actor: viser.GuiDropdownHandle[str] = gui.add_dropdown("Actor", NO_ACTORS, visible=False)  # pyright: ignore
+        """The props of each actor."""
+        self._actor: viser.GuiDropdownHandle[str] = gui.add_dropdown("Actor", NO_ACTOR, visible=False)  # pyright: ignore
         self._sheet: viser.GuiDropdownHandle[str] = gui.add_dropdown(  # pyright: ignore
             "Sheet position",
-            (ORIGIN,),
-            hint="Under a prop: the prop stands on the sheet's centre with its x axis to the right. "
-            "For any other place, run manipnet calibrate --at X Y Z --yaw DEGREES",
+            PLACES,
+            hint="under a prop: the prop stands on the centre of the sheet, with its x axis to the right; "
+            "for any other place, run manipnet calibrate --at X Y Z --yaw DEGREES",
         )
         for step, (text, label, icon) in STEPS.items():
             gui.add_markdown(f"{text}\n\n![{label}]({step}.png)", image_root=Path(__file__).parent)
-            button = gui.add_button(label, icon=icon, hint=f"Then keep still for {COUNTDOWN_S} s")
+            button = gui.add_button(label, icon=icon, hint=f"then keep your hands still for {COUNTDOWN_S} s")
             button.on_click(lambda _, step=step, button=button: perform(lambda: self._calibrate(step, button)))
         self._result = gui.add_markdown("")
 
     def refresh(self, bodies: dict[str, dict[str, Any]]) -> None:
-        """Update the lists of actors and props from the props by body and actor."""
+        """Offer the actors and the props that exist now, as the server lists them."""
         props = {actor: tuple(carried) for actor, carried in bodies.items()}
         if props == self._props:
             return
         self._props = props
         self._actor.options, self._actor.visible = tuple(props), len(props) > 1
         names = dict.fromkeys(name for carried in props.values() for name in carried)
-        self._sheet.options = (ORIGIN, *(f"under {name}" for name in names))
+        self._sheet.options = (*PLACES, *(f"under {name}" for name in names))
 
     def _calibrate(self, step: str, button: viser.GuiButtonHandle) -> None:
         request = {"op": "calibrate", "step": step, "actor": self._actor.value}
@@ -72,15 +73,15 @@ class CalibrateTab:
 
 
 def report(answer: dict[str, Any]) -> str:
-    """The text that shows the server's answer."""
+    """The result of a calibration as Markdown."""
     lines = [
-        f"**{answer['quality'].capitalize()}**: the hands are {answer['hand_scale']:.3f} times the size of the model's",
+        f"**{answer['quality'].capitalize()}**: the hands are {answer['hand_scale']:.3f} times as large as the model's",
         "",
     ]
     if answer["hands"]:
-        lines += ["| | held still within | changed by |", "|---|--:|--:|"]
+        lines += ["| | moved within | changed by |", "|---|--:|--:|"]
     for part, hand in answer["hands"].items():
         still, changed = (f"{hand[f'{what}_mm']:.1f} mm, {hand[f'{what}_deg']:.1f}°" for what in ("spread", "changed"))
         lines.append(f"| {part} | {still} | {changed} |")
-    saved = f"Saved in `{Path(answer['stored']).name}`" if answer.get("stored") else answer.get("note", "")
-    return "\n".join([*lines, "", saved])
+    kept = f"stored in `{Path(answer['stored']).name}`" if answer.get("stored") else answer.get("note", "")
+    return "\n".join([*lines, "", kept])

@@ -1,4 +1,4 @@
-"""Charts of the last half minute: the rate, the delay and the stages of the ticks."""
+"""Charts of the last half minute: rate, delay and the stages of each tick."""
 
 from collections import deque
 from typing import Final
@@ -13,13 +13,13 @@ SPAN_S: Final = 30.0
 STEP_S: Final = 0.2
 _COLUMNS: Final = ("t", "rate", "total", "sense", "infer", "ik")
 _EMPTY: Final = np.array([-SPAN_S, 0.0])
-"""The x values of an empty chart. With an empty span, the browser would never finish drawing."""
+"""The time span of an empty chart; a span of zero would keep the browser busy forever."""
 _INK: Final = "rgba(150,160,175,0.9)"
 _GRID: Final = {"stroke": "rgba(150,160,175,0.18)", "width": 1}
 
 
 class History:
-    """Rate and latencies of one actor's messages, one row every `STEP_S` seconds."""
+    """One row of measurements for every `STEP_S` seconds, taken from the messages."""
 
     def __init__(self) -> None:
         self._rows: deque[tuple[float, ...]] = deque(maxlen=int(SPAN_S / STEP_S))
@@ -28,7 +28,7 @@ class History:
 
     @property
     def rate_hz(self) -> float:
-        """The newest rate, or zero before the first row."""
+        """The newest rate; zero before the first row."""
         return self._rows[-1][1] if self._rows else 0.0
 
     def note(self, message: HandsMessage) -> None:
@@ -37,8 +37,8 @@ class History:
         if last is None or last.session != message.session or message.seq < last.seq:
             self._last, self._latencies = message, []
             return
-        computation_ms = latency.total - latency.buffer
-        self._latencies.append((computation_ms, latency.sense, latency.infer, latency.ik))
+        own_ms = latency.total - latency.buffer
+        self._latencies.append((own_ms, latency.sense, latency.infer, latency.ik))
         elapsed_s = message.t_publish - last.t_publish
         if elapsed_s >= STEP_S:
             rate_hz = (message.seq - last.seq) / elapsed_s
@@ -46,7 +46,7 @@ class History:
             self._last, self._latencies = message, []
 
     def columns(self) -> dict[str, Array]:
-        """`{name: (n,)}`: `t` in seconds before now; the latencies are the greatest of their step, in ms."""
+        """`{name: (n,)}`: `t` is the time before now in seconds, and the others are the worst values of each step."""
         if len(self._rows) < 2:
             return dict(zip(_COLUMNS, (_EMPTY, *[np.zeros(2)] * (len(_COLUMNS) - 1)), strict=True))
         rows = np.array(self._rows)
@@ -55,16 +55,16 @@ class History:
 
 
 class Plots:
-    """The charts in the panel of one visitor."""
+    """The charts in one visitor's panel."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._rate = _chart(gui, "Hands per second, last 30 s", (("hands/s", "#58a6ff"),), (0.0, 80.0))
-        self._delay = _chart(gui, "Computation per tick (ms)", (("packet to hands", "#f2a65a"),))
+        self._delay = _chart(gui, "Work per tick, ms", (("packet to hands", "#f2a65a"),))
         colors = (("sense", "#7ee787"), ("network", "#d2a8ff"), ("IK", "#ff7b72"))
-        self._stages = _chart(gui, "Stages (ms)", colors)
+        self._stages = _chart(gui, "Stages, ms", colors)
 
     def show(self, history: History) -> None:
-        """Draw the history."""
+        """Draw the newest rows."""
         columns = history.columns()
         self._rate.data = (columns["t"], columns["rate"])
         self._delay.data = (columns["t"], columns["total"])

@@ -1,4 +1,4 @@
-"""What the server sends to its live page: one tick of one actor, and the shapes of the props in it."""
+"""What the server sends to its live page: one tick of one actor, and the shapes in it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from manipnet.wire import HandsMessage, Side
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PropView:
-    """A prop: the name of its body, the name and hash of its shape, its scale, and its place on the body."""
+    """A prop: the name of its body, the name and hash of its shape, its scale, and its offset on the body."""
 
     name: str
     object: str
@@ -23,18 +23,18 @@ class PropView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandView:
-    """The network's output for one hand, in its wrist frame, as a right hand of the model's size."""
+    """What the network predicted for one hand, in its own wrist frame, as a right hand of the model's size."""
 
     prop: str
     distances: Array
-    """`(J,)` predicted distances of the joints to the surface."""
+    """`(22,)` joint to surface, as predicted."""
     raw_positions: Array
-    """`(J, 3)` joint positions before inverse kinematics."""
+    """`(22, 3)` before inverse kinematics."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One tick of one actor. `windows` are the trajectories `(21, 7)` around the tick, by body."""
+    """One tick of one actor. `windows` are the trajectories `(21, 7)` around it, by body."""
 
     message: HandsMessage
     props: tuple[PropView, ...]

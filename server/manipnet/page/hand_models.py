@@ -1,4 +1,4 @@
-"""Hands in the scene: the skin of the hand, deformed by the bones of each message."""
+"""The hands in the scene: the skin of the model's hand, deformed by the bones of each message."""
 
 from typing import Final
 
@@ -13,23 +13,23 @@ from manipnet.wire import HandPose, Side
 
 SKIN: Final = {"right": (226, 168, 138), "left": (213, 153, 128)}
 PALE: Final = {"right": (176, 164, 158), "left": (168, 156, 151)}
-"""Colours of a hand that is not live, but held or at rest."""
+"""The colour of a hand that is held or at rest."""
 GHOST: Final = (140, 190, 255)
 
 
 def wxyz(q: Array) -> Array:
-    """Quaternions xyzw in the order that viser expects."""
+    """Quaternions xyzw in viser's order, wxyz."""
     return q[..., [3, 0, 1, 2]]
 
 
 def world_bones(hand: Hand, side: Side, scale: float, angles: Array, wrist: Array) -> tuple[Array, Array]:
-    """World positions of the joints `(J, 3)` and world rotations of the bones `(B, 4)`."""
+    """World positions `(22, 3)` of the joints and rotations `(17, 4)` of the bones of a hand."""
     positions, rotations = forward_kinematics(hand, np.asarray(angles, np.float64))
     return hand_to_world(side, np.asarray(wrist, np.float64), positions * scale, rotations)
 
 
 class HandModel:
-    """One hand in the scene under `name`, translucent if it is a `ghost`."""
+    """One hand in the scene under `name`; `ghost` makes it translucent."""
 
     def __init__(
         self, scene: viser.SceneApi, name: str, hand: Hand, side: Side, scale: float, ghost: bool = False
@@ -56,7 +56,7 @@ class HandModel:
         )
 
     def pose(self, hand: HandPose, wrist: Array | None = None) -> None:
-        """Take the pose of a message's hand, at another `wrist (7,)` if one is given."""
+        """Take the pose of a message's hand, at its own wrist or at another `wrist (7,)`."""
         wrist = hand.wrist if wrist is None else wrist
         positions, quats = world_bones(self._hand, self.side, self.scale, hand.angles, wrist)
         for bone, position, quat in zip(self._mesh.bones, positions, wxyz(quats), strict=False):
@@ -66,16 +66,16 @@ class HandModel:
             self._mesh.color = (PALE if self._pale else SKIN)[self.side]
 
     def show(self, visible: bool) -> None:
-        """Show or hide the hand."""
+        """Show or hide it."""
         self._mesh.visible = visible
 
     def remove(self) -> None:
-        """Remove the hand from the scene."""
+        """Remove it from the scene."""
         self._mesh.remove()
 
 
 def _dense_weights(hand: Hand) -> np.ndarray:
-    """Weights of all bones for each vertex of the skin, `(V, B)` float32."""
+    """The skin's weights for every bone, `(V, B)` float32."""
     weights = np.zeros((len(hand.skin.vertices), hand.bone_count), np.float32)
     np.add.at(weights, (np.arange(len(weights))[:, None], hand.skin.bones), hand.skin.weights)
     return weights

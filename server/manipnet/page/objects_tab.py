@@ -1,4 +1,4 @@
-"""The tab that selects, scales, places and imports props."""
+"""The tab that selects, scales, places and imports the objects of the props."""
 
 import tempfile
 from pathlib import Path
@@ -15,47 +15,51 @@ from manipnet.page.gizmo import Gizmo
 from manipnet.synthesis.objects.mesh import FORMATS
 from manipnet.synthesis.objects.units import UNITS_M
 
-NO_CHOICE: Final[tuple[str, ...]] = ("none",)
+NONES: Final[tuple[str, ...]] = ("none",)
 
 
 class ObjectsTab:
-    """The object of each body, its scale, and its place on the body."""
+    """Lets an operator choose the object of each body, its size, and where it sits on the body."""
 
     def __init__(self, ask: Ask, client: viser.ClientHandle, perform: Perform) -> None:
         self._ask, self._perform, gui = ask, perform, client.gui
         self._gizmo = Gizmo(client.scene, self._drag)
-        self._props: dict[str, dict[str, Any]] = {}
+        self._carried: dict[str, dict[str, Any]] = {}
         self._shown: dict[str, Any] | None = None
-        """The selected prop as the controls show it, in the server's words."""
-        self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NO_CHOICE)  # pyright: ignore
-        self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Object", NO_CHOICE)  # pyright: ignore
-        self._scale = gui.add_slider("Scale", *SCALE_RANGE, 0.05, initial_value=1.0)
-        self._position = gui.add_vector3("Position (mm)", (0.0, 0.0, 0.0), step=1.0, hint="x, y, z on the body")
-        self._turn = gui.add_vector3("Rotation (°)", (0.0, 0.0, 0.0), step=1.0, hint="About x, y, z of the body")
+        """The state of the selected body that the controls show."""
+        self._body: viser.GuiDropdownHandle[str] = gui.add_dropdown("Body", NONES)  # pyright: ignore
+        self._object: viser.GuiDropdownHandle[str] = gui.add_dropdown("Object", NONES)  # pyright: ignore
+        self._scale = gui.add_slider("Size", *SCALE_RANGE, 0.05, initial_value=1.0)
+        self._position = gui.add_vector3(
+            "Position, mm", (0.0, 0.0, 0.0), step=1.0, hint="x, y, z in the frame of the body"
+        )
+        self._turn = gui.add_vector3(
+            "Rotation, °", (0.0, 0.0, 0.0), step=1.0, hint="about the x, y and z axes of the body"
+        )
         self._drags = gui.add_checkbox(
-            "Drag to move", False, hint="Show arrows and rings in the scene that move the object"
+            "Drag to move", False, hint="show arrows and rings in the scene that move the object on its body"
         )
         self._stand = gui.add_button(
-            "Place by the sheet",
+            "It stands on the sheet",
             icon=viser.Icon.ARROW_BAR_TO_DOWN,
-            hint="Find the object's place on its body while it stands upright on the centre of the calibration sheet",
+            hint="measure the position of the object on its body while the prop stands upright on the sheet's centre",
         )
-        self._unit = gui.add_dropdown("Unit of mesh files", tuple(UNITS_M), initial_value="m")
+        self._unit = gui.add_dropdown("Unit of the file", tuple(UNITS_M), initial_value="m")
         self._upload = gui.add_upload_button(
-            "Import a mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
+            "Import mesh …", icon=viser.Icon.UPLOAD, mime_type=",".join(FORMATS), hint=" ".join(FORMATS)
         )
         self._problems = gui.add_markdown("")
         self._stand.on_click(lambda _: self._perform(self._stand_on_sheet))
         self._body.on_update(by_visitor(self._show_body))
         for handle in (self._object, self._scale):
-            handle.on_update(by_visitor(lambda: self._perform(self._set_object)))
+            handle.on_update(by_visitor(lambda: self._perform(self._select)))
         for handle in (self._position, self._turn):
-            handle.on_update(by_visitor(lambda: self._perform(self._set_place)))
+            handle.on_update(by_visitor(lambda: self._perform(self._place)))
         self._upload.on_upload(lambda _: self._perform(self._import))
 
     def refresh(self, answer: dict[str, Any]) -> None:
-        """Update the controls from the server's answer to the request `objects`."""
-        self._props = {
+        """Offer the bodies and objects that exist now, as the server lists them."""
+        self._carried = {
             body if len(answer["bodies"]) == 1 else f"{actor}: {body}": {"actor": actor, "body": body, **prop}
             for actor, props in answer["bodies"].items()
             for body, prop in props.items()
@@ -64,27 +68,27 @@ class ObjectsTab:
         if self._object.options != objects:
             self._object.options = objects
         self._problems.content = "\n".join(f"⚠ {text}\n" for text in answer.get("problems", {}).values())
-        bodies = tuple(self._props) or NO_CHOICE
+        bodies = tuple(self._carried) or NONES
         if self._body.options != bodies:
             self._body.options = bodies
             self._show_body()
         elif (
-            self._props.get(self._body.value) != self._shown
-        ):  # a dropped file, the gizmo or another visitor changed it
+            self._carried.get(self._body.value) != self._shown
+        ):  # changed by a dropped file, the gizmo or another client
             self._show_body()
 
     def follow(self, frame: Frame | None) -> None:
-        """Move the gizmo to the selected prop of a live frame; None hides it."""
-        selected = self._props.get(self._body.value) if frame is not None and self._drags.value else None
-        if frame is None or selected is None or selected["actor"] != frame.message.actor:
+        """Move the gizmo to the selected prop of a live frame."""
+        chosen = self._carried.get(self._body.value) if frame is not None and self._drags.value else None
+        if frame is None or chosen is None or chosen["actor"] != frame.message.actor:
             self._gizmo.follow(None, None)
             return
-        offset = next((prop.offset for prop in frame.props if prop.name == selected["body"]), None)
-        pose = next((body.pose for body in frame.message.bodies if body.name == selected["body"]), None)
+        offset = next((prop.offset for prop in frame.props if prop.name == chosen["body"]), None)
+        pose = next((body.pose for body in frame.message.bodies if body.name == chosen["body"]), None)
         self._gizmo.follow(pose, offset)
 
     def _show_body(self) -> None:
-        prop = self._props.get(self._body.value)
+        prop = self._carried.get(self._body.value)
         if prop is None:
             return
         self._shown = prop
@@ -95,18 +99,18 @@ class ObjectsTab:
         turn = np.degrees(quat_log(np.array(prop.get("rotation", (0.0, 0.0, 0.0, 1.0)))))
         self._turn.value = np.round(turn, 2)
 
-    def _selected(self) -> dict[str, Any]:
-        prop = self._props.get(self._body.value)
+    def _chosen(self) -> dict[str, Any]:
+        prop = self._carried.get(self._body.value)
         if prop is None:
             raise ValueError(
-                "there are no objects yet; add one to the rig file, or start the server with --mesh NAME=FILE"
+                "no body carries an object yet; name one in the rig file, or start the server with --mesh NAME=FILE"
             )
         return {"actor": prop["actor"], "body": prop["body"]}
 
-    def _set_object(self) -> None:
-        self._ask(op="select_object", object=self._object.value, scale=self._scale.value, **self._selected())
+    def _select(self) -> None:
+        self._ask(op="select_object", object=self._object.value, scale=self._scale.value, **self._chosen())
 
-    def _set_place(self) -> None:
+    def _place(self) -> None:
         rotation = quat_exp(np.radians(self._turn.value))
         self._put(np.concatenate([1e-3 * np.array(self._position.value), rotation]))
 
@@ -115,24 +119,21 @@ class ObjectsTab:
 
     def _put(self, offset: Array, store: bool = True) -> None:
         place = {"position": offset[:3].tolist(), "rotation": offset[3:].tolist(), "store": store}
-        self._ask(op="place_object", **place, **self._selected())
+        self._ask(op="place_object", **place, **self._chosen())
 
     def _stand_on_sheet(self) -> None:
-        self._ask(op="place_object", on_sheet=True, **self._selected())
+        self._ask(op="place_object", on_sheet=True, **self._chosen())
 
     def _import(self) -> str:
         file = self._upload.value
         return self.import_mesh(file.name, file.content)
 
     def import_mesh(self, name: str, content: bytes) -> str:
-        """Give the selected body the mesh of a file; returns a message for the visitor.
-
-        Raises `RefusedError`, and `ValueError` if there are no objects.
-        """
-        selected = self._selected()
+        """Import a mesh file and let the selected body carry it. Raises `RefusedError`."""
+        chosen = self._chosen()
         with tempfile.TemporaryDirectory(prefix="manipnet-") as folder:
             path = Path(folder) / Path(name).name
             path.write_bytes(content)
             added = self._ask(op="add_object", file=str(path), unit=self._unit.value)
-        self._ask(op="select_object", object=added["object"], scale=1.0, **selected)
-        return f"{selected['body']} now has the mesh {added['object']}"
+        self._ask(op="select_object", object=added["object"], scale=1.0, **chosen)
+        return f"{chosen['body']} carries {added['object']}"

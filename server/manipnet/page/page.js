@@ -1,8 +1,8 @@
-// Added to viser's client: the title of the page, and the import of mesh files that are dropped on it.
+// What the page adds to viser's client: its title, and the import of files that are dropped on it.
 document.title = "ManipNet Live";
 
 const veil = document.createElement("div");
-veil.textContent = "Drop a mesh: OBJ, PLY, STL or GLB";
+veil.textContent = "Drop a mesh file here: OBJ, PLY, STL or GLB";
 veil.style.cssText =
   "position:fixed;inset:0;z-index:9999;display:none;align-items:center;justify-content:center;pointer-events:none;" +
   "font:600 24px sans-serif;color:#fff;background:rgba(30,60,110,.55);border:4px dashed #58a6ff";
@@ -22,10 +22,10 @@ function notify(text) {
   notify.timer = setTimeout(() => (note.style.display = "none"), 8000);
 }
 
-function importMesh(file) {
+function importFile(file) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   const socket = new WebSocket(`${scheme}://${location.host}/drop?name=${encodeURIComponent(file.name)}`);
-  notify(`${file.name} …`);
+  notify(`importing ${file.name} …`);
   socket.onopen = async () => socket.send(await file.arrayBuffer());
   socket.onmessage = (event) => notify(event.data);
   socket.onclose = (event) => event.reason && notify(event.reason);
@@ -39,5 +39,5 @@ addEventListener("dragleave", (event) => event.relatedTarget || (veil.style.disp
 addEventListener("drop", (event) => {
   event.preventDefault();
   veil.style.display = "none";
-  for (const file of event.dataTransfer.files) importMesh(file);
+  for (const file of event.dataTransfer.files) importFile(file);
 });

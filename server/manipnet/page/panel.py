@@ -16,15 +16,11 @@ from manipnet.page.show import Show
 from manipnet.page.takes_tab import TakesTab
 
 DOTS = {"live": "●", "hold": "◐", "rest": "○"}
-"""How the health table shows the state of a body."""
-NOTIFICATION_S = 6.0
+NOTE_S = 6.0
 
 
 class Panel:
-    """Panels of one visitor, built when the visitor connects.
-
-    An operator is a visitor on the server's own machine. Only operators get the controls.
-    """
+    """The panel beside the scene. A visitor on the server's own machine is an operator; the others can only watch."""
 
     def __init__(self, ask: Ask, show: Show, client: viser.ClientHandle, operator: bool) -> None:
         self._ask, self._show, self._client = ask, show, client
@@ -34,7 +30,7 @@ class Panel:
         self._paused = False
         gui = client.gui
         gui.main_panel.dock_right()
-        self._headline = gui.add_markdown("**Connecting …**")
+        self._headline = gui.add_markdown("**connecting …**")
         if operator:
             self._controls(gui)
             tabs = gui.add_tab_group()
@@ -53,7 +49,7 @@ class Panel:
         side.dock_left()
 
     def refresh(self) -> None:
-        """Update everything; called twice a second."""
+        """Show the newest state of the server; called twice a second."""
         try:
             self._refresh()
         except RefusedError as error:
@@ -73,7 +69,7 @@ class Panel:
             self._takes.refresh()
 
     def follow(self, frame: Frame | None) -> None:
-        """Move the gizmo with its prop; None means that a recording is shown."""
+        """Move the gizmo with its prop, as it is in a live frame; None hides it while a recording is shown."""
         if self.objects is not None:
             self.objects.follow(frame)
 
@@ -82,28 +78,26 @@ class Panel:
         try:
             text = action()
         except (RefusedError, ValueError, OSError) as error:
-            self._client.add_notification(
-                "That did not work", str(error), color="red", auto_close_seconds=3 * NOTIFICATION_S
-            )
+            self._client.add_notification("Failed", str(error), color="red", auto_close_seconds=3 * NOTE_S)
         else:
             if text:
-                self._client.add_notification("Done", text, color="green", auto_close_seconds=NOTIFICATION_S)
+                self._client.add_notification("Done", text, color="green", auto_close_seconds=NOTE_S)
 
     def _controls(self, gui: viser.GuiApi) -> None:
-        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="Hold the hands where they are")
+        self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="keep the hands as they are")
         rest = gui.add_button(
-            "Rest", icon=viser.Icon.HAND_STOP, hint="Ease the hands to their rest pose and start again from there"
+            "Rest", icon=viser.Icon.HAND_STOP, hint="ease both hands to the rest pose and start again from there"
         )
         self._on_click(self._pause, self._toggle_pause)
         self._on_click(rest, self._asking(op="rest"))
 
     def _scene(self, gui: viser.GuiApi) -> None:
-        slider = gui.add_slider("Look-ahead (ms)", 0, 500, 10, initial_value=500)
+        slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
         slider.on_update(by_visitor(lambda: self.perform(self._asking(op="look_ahead", seconds=1e-3 * slider.value))))
         for name, label in OVERLAYS.items():
             box = gui.add_checkbox(label, name in self._show.overlays)
             box.on_update(lambda event, name=name: self._show.set_overlay(name, event.target.value))
-        center = gui.add_button("Center the view", icon=viser.Icon.FOCUS_2)
+        center = gui.add_button("Center view", icon=viser.Icon.FOCUS_2)
         self._on_click(center, self._show.recenter)
 
     def _toggle_pause(self) -> None:
@@ -128,13 +122,13 @@ class Panel:
 def _headline(show: Show, status: dict[str, Any], history: History) -> str:
     frames = show.live.values()
     if not frames:
-        return "○ **Waiting for tracked bodies.** If none arrive, run `manipnet doctor`."
+        return "○ **Waiting for bodies.** Run `manipnet doctor` to find out why none arrive."
     latency = next(iter(frames)).message.latency_ms
-    state = "◐ **Paused**" if _paused(status) else "● **Live**"
+    what = "◐ **Paused**" if _paused(status) else "● **Live**"
     if show.recording is not None:
-        state = f"▶ **{show.recording.name}**"
-    delay = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms computation"
-    return f"{state} · {history.rate_hz:.0f} hands/s\n\n{delay}"
+        what = f"▶ **{show.recording.name}**"
+    waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms processing"
+    return f"{what} · {history.rate_hz:.0f} hands/s\n\n{waits}"
 
 
 def _paused(status: dict[str, Any]) -> bool:
@@ -152,12 +146,12 @@ def _health(status: dict[str, Any]) -> str:
             age = "never" if age_s is None or not math.isfinite(age_s) else _ago(age_s)
             rows.append(f"| {DOTS[health['state']]} | {body} | {rate_hz or 0.0:.0f} | {age} |")
         for side, hand in actor["hands"].items():
-            hands.append(f"{side} hand: **{hand['state']}**" + (f", {hand['object']}" if hand["object"] else ""))
+            hands.append(f"{side} hand **{hand['state']}**" + (f" on {hand['object']}" if hand["object"] else ""))
     counters = status["counters"]
-    rejected = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
-    lines = [*hands, f"{rejected or 'no'} frames or bodies rejected since the start"]
-    return "\n".join(rows) + "\n\n" + "\n\n".join(lines)
+    lost = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
+    refused = f"{lost} frames and bodies refused" if lost else "no frame or body refused"
+    return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, f"{refused} since the server started"])
 
 
 def _ago(age_s: float) -> str:
-    return f"{1e3 * age_s:.0f} ms ago" if age_s < 1.0 else f"{age_s:.0f} s ago"
+    return f"{1e3 * age_s:.0f} ms" if age_s < 1.0 else f"{age_s:.0f} s ago"

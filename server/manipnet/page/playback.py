@@ -1,4 +1,4 @@
-"""Recordings on the page: the hands of an MCAP file as frames at any time."""
+"""Recordings on the page: the hands of an MCAP file, as a frame at any instant."""
 
 import json
 import tempfile
@@ -16,7 +16,7 @@ from manipnet.wire import HandsMessage
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """The visible content of a file: the hands of its first actor, and the shapes of the props by hash."""
+    """What the page shows of a file: the hands of its first actor, and the shapes of its props by hash."""
 
     name: str
     messages: tuple[HandsMessage, ...]
@@ -25,23 +25,21 @@ class Recording:
 
     @property
     def seconds(self) -> float:
-        """The length of the recording."""
+        """Its duration."""
         return self.messages[-1].t_capture - self.messages[0].t_capture
 
     def at(self, second: float) -> Frame:
-        """The first frame at or after a time since the beginning. Recordings hold no sensor data."""
+        """The tick at or after `second`, counted from the beginning. What the hands sensed is not recorded."""
         begin_s = self.messages[0].t_capture
         index = bisect_left(self.messages, begin_s + second, key=lambda message: message.t_capture)
         return Frame(self.messages[min(index, len(self.messages) - 1)], self.props, {}, {})
 
 
 def read_recording(path: Path) -> Recording:
-    """Read a recording. Raises `RecordingError`, also for one without hands."""
+    """Read a recording. Raises `RecordingError`, also if it holds no hands."""
     messages = list(read_hands(path))
     if not messages:
-        raise RecordingError(
-            f"{path.name}: has no hands, only the bodies of the tracker; play it with `manipnet replay`"
-        )
+        raise RecordingError(f"{path.name}: holds bodies but no hands; play it to a server with `manipnet replay`")
     messages = tuple(message for message in messages if message.actor == messages[0].actor)
     props, shapes = [], {}
     for name, (mesh, scale) in _meshes(read_about(path)).items():
@@ -51,7 +49,7 @@ def read_recording(path: Path) -> Recording:
 
 
 def _meshes(about: About) -> dict[str, tuple[ClosedMesh, float]]:
-    """Meshes and their scales by body. A mesh that cannot be read is left out."""
+    """The mesh and the scale of each body; a mesh that cannot be read is left out."""
     meshes: dict[str, tuple[ClosedMesh, float]] = {}
     for body, carried in json.loads(about.metadata.get("objects", "{}")).items():
         if carried.get("object") in library_names():

@@ -1,4 +1,4 @@
-"""Props in the scene: the mesh of each prop at the pose of its body."""
+"""The objects in the scene: the mesh of each prop at the pose of its body."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -14,7 +14,7 @@ COLORS: Final = ((72, 132, 190), (222, 158, 62), (92, 166, 118), (190, 96, 110),
 
 
 class PropModels:
-    """The props of one actor under `name`. A prop gets a new model when its shape or scale changes."""
+    """The props of one actor under `name`; a prop is replaced when its shape or size changes."""
 
     def __init__(self, scene: viser.SceneApi, name: str, ghost: bool = False) -> None:
         self._scene, self._name, self._ghost = scene, name, ghost
@@ -23,7 +23,7 @@ class PropModels:
     def show(
         self, props: tuple[PropView, ...], shapes: Mapping[str, ShapeView], poses: Mapping[str, Array], visible: bool
     ) -> None:
-        """Show every prop whose shape and pose `(7,)` are known, and remove the others."""
+        """Draw every prop whose shape and pose `(7,)` are known, and hide the others."""
         shown = {prop.name: prop for prop in props if visible and prop.name in poses and prop.content_hash in shapes}
         for name in self._models.keys() - shown.keys():
             self._models.pop(name)[1].remove()
@@ -52,7 +52,7 @@ class PropModels:
 
 
 def lowest_m(props: tuple[PropView, ...], shapes: Mapping[str, ShapeView], poses: Mapping[str, Array]) -> float:
-    """Height of the lowest point of all props, in metres; infinite without props."""
+    """Height of the lowest point of all props, metres; infinite if there is none."""
     heights = [np.inf]
     for prop in props:
         if prop.name in poses and prop.content_hash in shapes:

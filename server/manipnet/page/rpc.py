@@ -1,4 +1,4 @@
-"""The connection of the page's process with the server: what it receives, and requests to the server."""
+"""The page's end of the pipe to the server: frames and shapes arrive, requests are sent."""
 
 import contextlib
 import itertools
@@ -15,37 +15,37 @@ import msgpack
 from manipnet.page.serialization import pack, unpack
 
 ANSWER_S: Final = 60.0
-"""Building the shape of a large mesh takes some time."""
+"""The shape of a large mesh takes a while to build."""
 
 
 class RefusedError(RuntimeError):
-    """The server refused a request or did not answer; the text says why."""
+    """The server refused a request; the text says why."""
 
 
 class RpcClient:
-    """One thread iterates over `incoming`; any other thread may call `ask`, `watch` and `log`."""
+    """`incoming` on one thread; `ask` and `watch` on any other."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._sending = threading.Lock()
         self._numbers = itertools.count()
-        self._pending: dict[int, Future] = {}
+        self._asked: dict[int, Future] = {}
 
     def incoming(self) -> Iterator[tuple[str, Any]]:
-        """Yield all messages except answers as they arrive; ends with the server."""
+        """Everything but answers, as it arrives; ends when the server ends."""
         with contextlib.suppress(EOFError, OSError):
             while True:
                 what, content = unpack(self._connection.recv_bytes())
                 if what == "answer":
                     number, answer = content
-                    self._pending.pop(number).set_result(msgpack.unpackb(answer))
+                    self._asked.pop(number).set_result(msgpack.unpackb(answer))
                 else:
                     yield what, content
 
     def ask(self, **request: Any) -> dict[str, Any]:
-        """Send a control request, as in docs/protocol.md, and return the answer. Raises `RefusedError`."""
+        """Send one control request of docs/protocol.md and return its answer. Raises `RefusedError`."""
         number, answer = next(self._numbers), Future()
-        self._pending[number] = answer
+        self._asked[number] = answer
         self._send("ask", (number, msgpack.packb(request)))
         try:
             reply = answer.result(ANSWER_S)
@@ -60,21 +60,21 @@ class RpcClient:
         self._send("watched", watched)
 
     def log(self, level: int, text: str) -> None:
-        """Write a line to the server's log."""
+        """Send a line to the server's log."""
         self._send("log", (level, text))
 
     def _send(self, what: str, content: Any) -> None:
-        with self._sending, contextlib.suppress(OSError):  # the server has ended, and then `incoming` ends too
+        with self._sending, contextlib.suppress(OSError):  # the server has ended, which `incoming` notices
             self._connection.send_bytes(pack(what, content))
 
 
 class RpcLog(logging.Handler):
-    """Forwards the log of this process to the server's log."""
+    """Forwards the log of this process to the server's."""
 
     def __init__(self, link: RpcClient) -> None:
         super().__init__(logging.WARNING)
         self._link = link
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Forward one record."""
+        """Send one record."""
         self._link.log(record.levelno, self.format(record))

@@ -1,4 +1,4 @@
-"""The scenery: lights, a round table, and the view of a visitor's camera."""
+"""The surroundings of the hands: lights, a round table, and the first view of each camera."""
 
 from typing import Final
 
@@ -11,15 +11,15 @@ TABLE_M: Final = (0.62, 0.03)
 """Radius and thickness."""
 TABLE_COLOR: Final = (66, 71, 80)
 VIEW: Final = np.array([0.22, 0.50, 0.85])
-"""Direction from the hands to the camera."""
+"""Offset of the camera from the hands."""
 VIEW_M: Final = 0.92
 KEY_M, RIM_M = np.array([0.35, 1.4, 0.55]), np.array([-0.8, 0.6, -0.9])
-"""Offsets from the hands to the lights."""
+"""Offsets of the lights from the hands."""
 FIELD_OF_VIEW_RAD: Final = 0.70
 
 
 class Scenery:
-    """Lights and table. The table is placed under the first frame, and moves down when something is lower."""
+    """The lights and the table. The table stands below everything that has been shown so far."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
@@ -34,11 +34,11 @@ class Scenery:
 
     @property
     def placed(self) -> bool:
-        """Whether the table has been placed."""
+        """Whether anything has been shown."""
         return self._table is not None
 
     def place(self, points: Array, floor_m: float) -> None:
-        """Put the top of the table at the height `floor_m`, under `points (n, 3)`; cameras look at their middle."""
+        """Place the table at the height `floor_m`, below `points (n, 3)`; cameras look at the middle of the points."""
         self._center = 0.5 * (points.min(axis=0) + points.max(axis=0))
         x, _, z = self._center
         if self._table is not None:
@@ -56,7 +56,7 @@ class Scenery:
         self._rim.position = tuple(self._center + RIM_M)
 
     def lower(self, floor_m: float) -> None:
-        """Move the table down to `floor_m` if it is higher."""
+        """Lower the table to `floor_m` if it is above."""
         if self._table is not None and floor_m < self._table.position[1] + 0.5 * TABLE_M[1]:
             x, _, z = self._table.position
             self._table.position = (x, floor_m - 0.5 * TABLE_M[1], z)

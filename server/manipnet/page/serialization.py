@@ -1,4 +1,4 @@
-"""Messages between the server and the page's process. They are msgpack, so reading one cannot run code."""
+"""Messages between the server and its page's process, as msgpack: reading one cannot run code."""
 
 from dataclasses import fields
 from typing import Any, Final
@@ -11,17 +11,17 @@ from manipnet.wire import HandsMessage, decode_msgpack, encode_msgpack
 
 _ARRAY, _HANDS = 1, 2
 _VIEWS: Final[dict[int, type]] = {3: PropView, 4: HandView, 5: Frame, 6: ShapeView}
-"""Values that are sent as the tuple of their fields, by their extension type."""
+"""Values that are sent as the tuple of their fields, by their msgpack extension type."""
 _CODES: Final = {kind: code for code, kind in _VIEWS.items()}
 
 
 def pack(what: str, content: Any) -> bytes:
-    """One message. Its content may be anything that msgpack supports, a frame or a shape."""
+    """Encode one message. Its content is anything that msgpack knows, a frame or a shape."""
     return _packed((what, content))
 
 
 def unpack(payload: bytes) -> tuple[str, Any]:
-    """The inverse of `pack`, except that lists become tuples."""
+    """Decode a message of `pack`; lists become tuples."""
     return _unpacked(payload)
 
 

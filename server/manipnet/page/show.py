@@ -20,7 +20,7 @@ from manipnet.synthesis.hand.hand import Hand
 from manipnet.wire import Side
 
 FLOOR_EVERY: Final = 15
-"""The height of the table is checked once in this many frames."""
+"""The table is checked against the lowest point once in this many frames."""
 
 
 class Show:
@@ -133,7 +133,7 @@ class ActorView:
         self._scene, self._name, self._hand = scene, f"/{name}", hand
         self._hands: dict[Side, HandModel] = {}
         self._props = PropModels(scene, f"/{name}/props")
-        self._overlays = ActorOverlays(scene, f"/{name}/overlays", hand)
+        self._overlays = ActorOverlays(scene, f"/{name}/layers", hand)
 
     def show(self, frame: Frame, shapes: dict[str, ShapeView], overlays: set[str]) -> None:
         """Draw one frame with the given overlays."""

@@ -1,8 +1,8 @@
-"""The server's side of the live page: its address, and the process that serves it from the first visit on.
+"""The live page as the server sees it: an address, and a child process from the first visit on.
 
-The page costs the server a socket until a browser connects, and then one thread that sends the newest ticks to the
-page's process. That process ends with the server, however the server ends. If the process ends first, the next visit or
-the browser's reconnecting starts another one.
+Nothing of the page runs in the server: until a browser connects it costs a socket, and then one thread that sends the
+newest tick. The process ends with the server, however the server ends. If the process ends, the next visit or a
+browser that reconnects starts another one.
 """
 
 import contextlib
@@ -31,32 +31,30 @@ from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage
 
 FRAMES_HZ: Final = 30.0
-"""At most this many ticks per second are sent to the page, always the newest."""
+"""The page receives at most this many ticks per second, always the newest."""
 POLL_S: Final = 0.2
-"""Longest time until a stop is noticed."""
+"""A stop is noticed within this."""
 STOP_S: Final = 3.0
 RESTART_S: Final = (0.5, 30.0)
-"""Shortest and longest pause before a page that ended is started again. The pause doubles each time."""
+"""The pause before the page is started again; it grows each time the page ends early."""
 LASTED_S: Final = 60.0
-"""After a page that ran for this long, the pause is short again."""
 
 _log = logging.getLogger(__name__)
-Answer = Callable[[list[bytes]], bytes]
+Submit = Callable[[list[bytes], Callable[[bytes], object]], None]
+"""Meets a request, and gives the answer to the function, on any thread."""
 
 
 class LivePage:
-    """Listens from its construction until `stop`, and serves from `start`. The tick thread calls `see`."""
+    """Listens from its creation until `stop`, and serves from `start` on. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry, hand_file: Path) -> None:
-        """`answer` answers the page's control requests, and `hand_file` describes the hand to show.
-
-        Raises `ListenError`.
-        """
+    def __init__(self, host: str, port: int, submit: Submit, telemetry: Telemetry, hand_file: Path) -> None:
+        """Raises `ListenError`. `submit` receives the requests of the page, as it does for any client; `hand_file`
+        describes the hand that is shown."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._answer, self._telemetry, self._hand_file = answer, telemetry, hand_file
+        self._submit, self._telemetry, self._hand_file = submit, telemetry, hand_file
         self.watched = False
-        """Whether a browser is open. Otherwise `see` need not be called."""
+        """Whether a browser is open; only then `see` is worth calling."""
         self._arrived, self._sending = threading.Condition(), threading.Lock()
         self._newest: dict[str, tuple[Frame, Sequence[Shape]]] = {}
         self._stopping = threading.Event()
@@ -68,7 +66,7 @@ class LivePage:
         self._thread.start()
 
     def see(self, actor: Actor, plan: Plan, message: HandsMessage) -> None:
-        """Offer a tick without computing or copying anything. It replaces the last one, if that was not sent yet."""
+        """Offer a tick, without computing or copying anything. A tick that was not sent yet is replaced by the next."""
         frame = frame_of(actor, plan.tick, plan.steps, message)
         with self._arrived:
             if message.actor in self._newest:
@@ -91,17 +89,19 @@ class LivePage:
             begin_s = time.monotonic()
             try:
                 self._serve()
-            except Exception as error:  # the session continues without a page
-                _log.error("page: %s: %s", type(error).__name__, error)
+            except Exception as error:  # the session must continue without a page
+                _log.error("the page failed: %s: %s", type(error).__name__, error)
             if self._stopping.is_set():
                 return
             self._telemetry.count("page_ended", reason="crash")
-            _log.error("the page's process has ended; the session continues, and the next visit starts the page again")
+            _log.error(
+                "the process of the page has ended; the session continues, and the next visit starts the page again"
+            )
             pause_s = RESTART_S[0] if time.monotonic() - begin_s > LASTED_S else min(2.0 * pause_s, RESTART_S[1])
             self._stopping.wait(pause_s)
 
     def _visited(self) -> bool:
-        """Wait for a browser; returns False when the server stops."""
+        """Wait for a browser; False when the server stops."""
         with selectors.DefaultSelector() as selector:
             selector.register(self._listener, selectors.EVENT_READ)
             selector.register(self._woken, selectors.EVENT_READ)
@@ -109,13 +109,13 @@ class LivePage:
         return not self._stopping.is_set()
 
     def _serve(self) -> None:
-        """Start the page's process, and serve until it or the server ends."""
+        """Run the page's process until it or the server ends."""
         child = ChildProcess("page", _page, self._listener, self._hand_file)
         ours = child.connection
-        sender = threading.Thread(target=self._send_frames, args=(ours,), name="page-out", daemon=True)
+        sender = threading.Thread(target=self._send, args=(ours,), name="page-out", daemon=True)
         try:
             sender.start()
-            self._receive(ours)
+            self._listen_to(ours)
         finally:
             self.watched = False
             child.close(STOP_S)
@@ -125,8 +125,8 @@ class LivePage:
                 self._arrived.notify()
             sender.join()
 
-    def _receive(self, ours: Connection) -> None:
-        """Handle the messages of the page's process until it or the server ends."""
+    def _listen_to(self, ours: Connection) -> None:
+        """Receive from the page until it or the server ends: whether it is watched, its requests, and its log."""
         while not self._stopping.is_set():
             try:
                 if not ours.poll(POLL_S):
@@ -138,12 +138,16 @@ class LivePage:
                 self.watched = content
             elif what == "ask":
                 number, request = content
-                self._send_message(ours, "answer", (number, self._answer([request])))
+
+                def reply(answer: bytes, number: int = number) -> None:
+                    self._send_message(ours, "answer", (number, answer))
+
+                self._submit([request], reply)
             elif what == "log":
                 _log.log(content[0], "%s", content[1])
 
-    def _send_frames(self, ours: Connection) -> None:
-        """Send the newest ticks, and each shape before the first tick that contains it."""
+    def _send(self, ours: Connection) -> None:
+        """Send the newest ticks, and each shape before the first tick that refers to it."""
         sent: set[str] = set()
         while not ours.closed:
             with self._arrived:
@@ -164,12 +168,12 @@ class LivePage:
 
     def _send_message(self, ours: Connection, what: str, content: Any) -> None:
         message = pack(what, content)
-        with self._sending, contextlib.suppress(OSError, ValueError):  # the process has ended, which `_receive` notices
+        with self._sending, contextlib.suppress(OSError, ValueError):  # the page has ended, which `_listen_to` notices
             ours.send_bytes(message)
 
 
 def frame_of(actor: Actor, tick: Tick, steps: Mapping[Side, HandStep], message: HandsMessage) -> Frame:
-    """Everything that the page shows of one tick of an actor."""
+    """Everything that the page can show of one tick of an actor."""
     props = tuple(_prop(prop, actor.offset(prop.name)) for prop in actor.props)
     windows = {name: body.window for name, body in tick.bodies.items()}
     hands: dict[Side, HandView] = {}
@@ -184,7 +188,7 @@ def _prop(prop: Prop, offset: Array) -> PropView:
 
 
 def _page(connection: Connection, listener: socket.socket, hand_file: Path) -> None:
-    from manipnet.page.app import serve  # the server itself does not need its libraries
+    from manipnet.page.app import serve  # the server itself does not need the libraries of the page
 
     serve(listener, connection, hand_file)
 

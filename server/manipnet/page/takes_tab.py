@@ -1,4 +1,4 @@
-"""The tab that records takes and shows them."""
+"""The tab that records takes and plays them back."""
 
 import threading
 import time
@@ -16,18 +16,18 @@ NONE: Final[str] = "none"
 
 
 class TakesTab:
-    """Starts and stops recording, plays a recording, and returns to the live session."""
+    """Records, shows a recording at any instant, and returns to the live session."""
 
     def __init__(self, ask: Ask, show: Show, gui: viser.GuiApi, perform: Perform) -> None:
         self._ask, self._show = ask, show
         self._folder, self._recording = Path(), False
         self._playing = threading.Event()
         self._record = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color="red")
-        self._status = gui.add_markdown("")
+        self._progress = gui.add_markdown("")
         gui.add_divider()
         self._take = gui.add_dropdown("Take", (NONE,))
         self._open = gui.add_button("Show this take", icon=viser.Icon.MOVIE)
-        self._scrub = gui.add_slider("Time (s)", 0.0, 1.0, 0.01, initial_value=0.0, visible=False)
+        self._scrub = gui.add_slider("Time, s", 0.0, 1.0, 0.01, initial_value=0.0, visible=False)
         self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY, visible=False)
         self._live = gui.add_button("Back to live", icon=viser.Icon.BROADCAST, visible=False)
         self._record.on_click(lambda _: perform(self._toggle_record))
@@ -37,7 +37,7 @@ class TakesTab:
         self._scrub.on_update(by_visitor(lambda: show.seek(self._scrub.value)))
 
     def refresh(self) -> None:
-        """Update the list of takes and the state of recording."""
+        """Show the recording in progress and offer the takes in the folder."""
         answer = self._ask(op="recordings")
         self._folder = Path(answer["folder"])
         takes = tuple(answer["recordings"]) or (NONE,)
@@ -48,8 +48,8 @@ class TakesTab:
             self._recording = now is not None
             self._record.label = "Stop recording" if self._recording else "Record"
             self._record.icon = viser.Icon.PLAYER_STOP if self._recording else viser.Icon.PLAYER_RECORD
-        self._status.content = (
-            f"● **{now['name']}** · {now['seconds']:.0f} s" if now else f"Takes are saved in `{self._folder}`."
+        self._progress.content = (
+            f"● **{now['name']}** · {now['seconds']:.0f} s" if now else f"Takes are saved in `{self._folder}`"
         )
 
     def _toggle_record(self) -> str | None:
@@ -57,36 +57,36 @@ class TakesTab:
             self._ask(op="record")
             return None
         answer = self._ask(op="stop_recording")
-        return f"{answer['name']}: {answer['hands']} hands messages, {answer['bodies']} frames of bodies"
+        return f"{answer['name']}: {answer['hands']} hands messages, {answer['bodies']} body frames"
 
     def _show_take(self) -> None:
         if self._take.value == NONE:
             raise ValueError("there is no take yet; press Record")
         recording = read_recording(self._folder / self._take.value)
-        self._stop()
+        self._pause()
         self._show.play(recording)
         self._scrub.max, self._scrub.value = max(round(recording.seconds, 2), 0.01), 0.0
         self._scrub.visible = self._play.visible = self._live.visible = True
 
     def _back(self) -> None:
-        self._stop()
+        self._pause()
         self._show.play(None)
         self._scrub.visible = self._play.visible = self._live.visible = False
 
     def _toggle_play(self) -> None:
         if self._playing.is_set():
-            self._stop()
+            self._pause()
             return
         self._playing.set()
-        self._play.label, self._play.icon = "Stop", viser.Icon.PLAYER_PAUSE
+        self._play.label, self._play.icon = "Pause playback", viser.Icon.PLAYER_PAUSE
         threading.Thread(target=self._run, name="playback", daemon=True).start()
 
-    def _stop(self) -> None:
+    def _pause(self) -> None:
         self._playing.clear()
         self._play.label, self._play.icon = "Play", viser.Icon.PLAYER_PLAY
 
     def _run(self) -> None:
-        """Play from the time of the slider, and repeat."""
+        """Play from the position of the slider, again and again."""
         while self._playing.is_set():
             self._scrub.value = (self._scrub.value + 1.0 / PLAY_HZ) % self._scrub.max
             self._show.seek(self._scrub.value)

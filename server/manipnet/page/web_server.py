@@ -1,4 +1,4 @@
-"""A viser server on a given socket, without a public tunnel, that admits only pages of its own."""
+"""A viser server on a given socket that answers only its own pages and opens no public tunnel."""
 
 import asyncio
 import contextlib
@@ -17,28 +17,31 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from manipnet.net.addresses import is_loopback
-from manipnet.outputs.websocket.server import LOCAL_PAGES
+from manipnet.net.half_open import BACKLOG, HalfOpen
+from manipnet.page import policy
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
-"""Whether the current connection may change anything, which needs a page and a visitor on this machine."""
+"""Whether the visitor may change anything: a browser on this machine that shows a page of this machine."""
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
-"""The script that the page adds to viser's client: a title, and the import of dropped files."""
+"""What the page adds to viser's client: a title, and the import of files that are dropped on it."""
 DROP_PATH: Final = "/drop"
+OPEN_S: Final = 10.0
+"""A visitor that has not sent a whole request after this time is cut off."""
 _POLICY_VIOLATION: Final = 1008
 
 Dropped = Callable[[str, bytes], str]
 
 
 class Server(viser.ViserServer):
-    """Viser without its public tunnel, which any visitor could open."""
+    """Viser without its public tunnel, which any visitor could open otherwise."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Open no tunnel."""
+        """Nothing is shared."""
         return None
 
 
 def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server:
-    """Serve on a socket that already listens; on loopback, only pages of this machine are admitted.
+    """Serve on a socket that already listens; on loopback, only pages of this machine may connect.
 
     `dropped` receives the name and content of a file that an operator dropped on the page, and returns a message.
     """
@@ -48,7 +51,7 @@ def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server
 
 @contextlib.contextmanager
 def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
-    """Replace the function with which viser serves, which has no option for a socket or for allowed origins."""
+    """Viser has no option for a socket or for origins, so the function that it calls is replaced meanwhile."""
     original = websockets.asyncio.server.serve
     exposed = not is_loopback(listener.getsockname()[0])
 
@@ -56,21 +59,33 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
         async def handle(connection: ServerConnection) -> None:
             request = connection.request
             assert request is not None
-            OPERATOR.set(may_operate(connection.remote_address[0], request.headers))
+            OPERATOR.set(may_act(connection.remote_address[0], request.headers))
             if urlsplit(request.path).path == DROP_PATH:
-                await _receive_file(connection, request, dropped)
+                await _take_in(connection, request, dropped)
             else:
                 await handler(connection)
 
         def answer(connection: ServerConnection, request: Request) -> Response | None:
-            if not may_view(request.headers, exposed):
-                return connection.respond(HTTPStatus.FORBIDDEN, "Other web sites may not use this page.\n")
-            with contextlib.suppress(KeyError):  # the script can only be added to an uncompressed page
+            if not may_look(request.headers, exposed):
+                return connection.respond(HTTPStatus.FORBIDDEN, "This page is not for other web sites.\n")
+            if (reason := policy.refusal(request)) is not None:
+                return connection.respond(HTTPStatus.BAD_REQUEST, reason)
+            with contextlib.suppress(KeyError):  # the script is inserted into the uncompressed page
                 del request.headers["Accept-Encoding"]
             response = process_request(connection, request)
-            return _with_script(response) if urlsplit(request.path).path == "/" else response
+            if response is not None and policy.is_page(response, request):
+                policy.protect(response, SCRIPT)
+            return response
 
-        return original(handle, sock=listener, process_request=answer, **options)
+        return original(
+            handle,
+            sock=listener,
+            process_request=answer,
+            create_connection=HalfOpen().connection,
+            open_timeout=OPEN_S,
+            backlog=BACKLOG,
+            **options,
+        )
 
     websockets.asyncio.server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
     try:
@@ -79,35 +94,25 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
         websockets.asyncio.server.serve = original  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def may_view(headers: Any, exposed: bool) -> bool:
-    """Whether a request is admitted: one from a page of this machine, from a program that is not a page or, if other
-    machines are admitted, from the page itself. Other web sites in the same browser are not admitted."""
-    origin, host = headers.get("Origin"), headers.get("Host", "")
-    local = LOCAL_PAGES.fullmatch(f"http://{host}") is not None
-    if origin is None:
-        return local or exposed
-    return (local and LOCAL_PAGES.fullmatch(origin) is not None) or (exposed and origin == f"http://{host}")
+def may_look(headers: Any, exposed: bool) -> bool:
+    """Whether a request comes from the page itself or from no page at all, through an address of this machine or, where
+    other machines are let in, through any: no other web site open in the same browser may look, also none of this
+    machine."""
+    host, origin = headers.get("Host", ""), headers.get("Origin")
+    return policy.is_own_page(headers) or (exposed and origin in (None, f"http://{host}"))
 
 
-def may_operate(address: str, headers: Any) -> bool:
-    """Whether a visitor may change anything: only on this machine, through a loopback address."""
-    return is_loopback(address) and may_view(headers, exposed=False)
+def may_act(address: str, headers: Any) -> bool:
+    """Whether a visitor may change anything: one on this machine, through an address of this machine only."""
+    return is_loopback(address) and may_look(headers, exposed=False)
 
 
-async def _receive_file(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
-    """Receive one dropped file, with its name in the query and its content in the only message."""
+async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
+    """Receive one file: its name is in the query, its content is the only message."""
     if not OPERATOR.get():
-        await connection.close(_POLICY_VIOLATION, "only a visitor on the server's own machine can import files")
+        await connection.close(_POLICY_VIOLATION, "only a browser on the server's own machine may import files")
         return
     name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
     with contextlib.suppress(ConnectionClosed):
         content = await connection.recv(decode=False)
         await connection.send(await asyncio.to_thread(dropped, name, content))
-
-
-def _with_script(response: Response | None) -> Response | None:
-    if response is not None and response.status_code == HTTPStatus.OK:
-        response.body = (response.body or b"").replace(b"</body>", f"<script>{SCRIPT}</script></body>".encode(), 1)
-        del response.headers["Content-Length"]
-        response.headers["Content-Length"] = str(len(response.body))
-    return response

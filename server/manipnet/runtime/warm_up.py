@@ -63,8 +63,8 @@ def pose_a_hand(bundle: Bundle, solver: str = DEFAULT_SOLVER) -> None:
     outputs = bundle.infer(np.zeros((1, layout.input_size), np.float32))
     poses = allocate_poses(hand, 1)
     poses.correction[:] = 0.0
-    network = layout.output_starts, outputs, before, bundle.response, bundle.limits
-    pose_kernel(solver)(hand.packed, shape.solid, windows, *network, 0, 1, poses)
+    network = outputs, before, bundle.response, bundle.limits
+    pose_kernel(solver)(hand.packed, layout.output_starts, shape.solid, windows, *network, 0, 1, poses)
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from manipnet.common.options import ConfigError
 from manipnet.config.settings import ServerConfig, check
+from manipnet.jit import seal_cache
 from manipnet.net.curve_keys import read_server_keys
 from manipnet.runtime.status import SecondLines, SilenceWatch
 from manipnet.server.services import open_services
@@ -62,6 +63,7 @@ class Server:
         name is unknown.
         """
         self._session.warm_up()
+        seal_cache()
         with ExitStack() as opened:
             services = open_services(self._session, self._keys, opened)
             self.addresses = services.addresses

@@ -1,4 +1,4 @@
-// Runs the plugin's source and factory on working stubs of the engine against a live server: `glue ADDRESS`.
+// Runs the plugin's source and factory on stubs of the engine with a live server: `glue ADDRESS`.
 #include <chrono>
 #include <iostream>
 #include <map>
@@ -40,7 +40,7 @@ int main(int, char** words) {
     }}));
     std::dynamic_pointer_cast<SEditableTextBox>(panel->Children[0])->Set(FText::FromString(words[1]));
     std::dynamic_pointer_cast<SButton>(panel->Children[1])->Click();
-    source = factory.CreateSource(preset.c_str());  // as a preset does
+    source = factory.CreateSource(preset.c_str());  // a preset does the same
 
     Recorder recorder;
     source->ReceiveClient(&recorder, FGuid());

@@ -1,5 +1,5 @@
-// Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS` and others. Talks
-// in text lines.
+// Runs the engine-free core for the tests, which talk to it in lines of text: `decode FILES`, `interpolate`, `axes`,
+// `live ADDRESS` and others.
 #include <atomic>
 #include <chrono>
 #include <cstdio>
@@ -76,7 +76,7 @@ std::string Describe(const HandsFrame& frame) {
 void DecodeFile(const char* path) {
     std::ifstream file(path, std::ios::binary);
     const std::vector<char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    // An exact heap copy, so that the sanitizer sees any read beyond the end.
+    // A heap copy of exact size lets the sanitizer notice reads beyond the end.
     const std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
     HandsFrame frame;
     const std::string error = Decode(data.data(), data.size(), frame);
@@ -130,7 +130,7 @@ void Axes() {
     }
 }
 
-/// From a message in hex: name, parent and local pose of every bone of the left hand.
+/// Reads a message in hex and prints name, parent and local pose of every bone of the left hand.
 void DescribeSkeleton() {
     std::string hex;
     std::cin >> hex;
@@ -147,7 +147,7 @@ void DescribeSkeleton() {
     }
 }
 
-/// What every line, as a connection string, means.
+/// Prints the meaning of each line as a connection string.
 void Connections() {
     for (std::string line; std::getline(std::cin, line);) {
         Connection to;
@@ -157,7 +157,7 @@ void Connections() {
     }
 }
 
-/// What a program does that shows hands, and notes of it. Allocates nothing but for answers.
+/// Shows hands as a program would, and records what it received and showed. Only answers allocate.
 class Show {
 public:
     explicit Show(Client& client) : From(client), Noted(1 << 16) {}
@@ -212,8 +212,8 @@ bool Connect(const std::string& address, Connection& to) {
     return error.empty();
 }
 
-/// Show at about 90 Hz until standard input ends. For every line read: figures, or for "arrivals" the number and the
-/// arrival of every frame since the last time.
+/// Shows at about 90 Hz until standard input ends. Answers "arrivals" with number and time of every frame since the
+/// last time, and any other line with figures.
 int Live(const std::string& address) {
     Connection to;
     if (!Connect(address, to)) return 2;
@@ -233,7 +233,7 @@ int Live(const std::string& address) {
             const int what = asked.exchange(kNothing);
             if (what == kNothing) continue;
             std::cout << (what == kArrivals ? show.Arrivals() : show.Figures()) << std::endl;
-            Allocations = 0;  // what answering costs does not count
+            Allocations = 0;  // the allocations of answers do not count
         }
     }
     asking.join();
@@ -241,7 +241,7 @@ int Live(const std::string& address) {
     return 0;
 }
 
-/// Never shows anything and blocks the main thread: figures for every line read.
+/// Blocks the main thread and shows nothing; prints figures for every line of standard input.
 int Idle(const std::string& address) {
     Connection to;
     if (!Connect(address, to)) return 2;

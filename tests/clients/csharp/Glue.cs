@@ -8,7 +8,7 @@ using ManipNet.Client.Unity;
 using UnityEditor;
 using UnityEngine;
 
-/// <summary>Runs the components on working stubs of the engine against a live server: `glue ADDRESS`.</summary>
+/// <summary>Runs the components on stubs of the engine with a live server: `glue ADDRESS`.</summary>
 static class Glue
 {
     static readonly Vector3[] Knuckles =
@@ -23,8 +23,8 @@ static class Glue
     {
         Thread.CurrentThread.CurrentCulture = CultureInfo.InvariantCulture;
         var tests = new ManipNet.Client.Tests.DecoderTests();
-        tests.RefusesWhatIsNoMessage();
-        tests.RefusesAnotherVersionNamingBoth();
+        tests.RefusesOtherData();
+        tests.NamesBothVersionsWhenItRefusesOne();
 
         var scene = new GameObject("scene");
         var receiver = scene.AddComponent<ManipNetReceiver>();
@@ -74,7 +74,7 @@ static class Glue
         return 0;
     }
 
-    /// <summary>The sample for the Package Manager, as if play had been pressed.</summary>
+    /// <summary>Runs the package's sample as in play mode.</summary>
     static void Sample(string address)
     {
         var place = new GameObject("sample");
@@ -98,15 +98,15 @@ static class Glue
         return place.transform.All().Select(t => t.gameObject.GetComponent<ManipNetJoints>()).Where(found => found != null).ToArray();
     }
 
-    /// <summary>A person tries a wrong address, the right one, sets up a character, and stops.</summary>
+    /// <summary>Tests a wrong and the right address in the window, sets up a character, and stops the test.</summary>
     static void Window(string address)
     {
         var window = new ManipNetWindow();
         Call(window, "OnEnable");
         EditorGUILayout.Typed = "nowhere";
-        Press(window, "Try");
+        Press(window, "Test connection");
         EditorGUILayout.Typed = address;
-        Press(window, "Try");
+        Press(window, "Test connection");
         for (int i = 0; i < 1000 && !EditorGUILayout.Drawn.Any(line => line.StartsWith("Rate: ") && line != "Rate: 0.0 Hz"); i++)
         {
             Thread.Sleep(10);
@@ -115,8 +115,8 @@ static class Glue
         var character = new GameObject("character");
         Skeleton(character.AddComponent<Animator>(), "");
         Selection.activeGameObject = character;
-        Press(window, "Put fingers on the selected character");
-        Press(window, "Stop");
+        Press(window, "Add hands to the selected character");
+        Press(window, "Stop test");
         Call(window, "OnDisable");
         int k = 0;
         foreach (string line in EditorGUILayout.Drawn.Distinct()) Console.WriteLine("drawn" + k++ + " " + line);
@@ -130,7 +130,8 @@ static class Glue
     }
 
     /// <summary>
-    /// A hand whose bones lie along x, as ours, mirrored into Unity's axes: a Humanoid's, or with `names` for bones.
+    /// Creates a hand whose bones lie along x, as the model's do, in Unity's axes: of a Humanoid, or with bones named
+    /// after `names`.
     /// </summary>
     static Transform Skeleton(Animator animator, string names)
     {

@@ -6,7 +6,10 @@ using System.Text;
 using System.Threading;
 using ManipNet.Client;
 
-/// <summary>Runs the engine-free core for the tests: `decode FILES`, `interpolate`, `axes`, `live ADDRESS` and others, in text lines.</summary>
+/// <summary>
+/// Runs the engine-free core for the tests, which talk to it in lines of text: `decode FILES`, `live ADDRESS` and
+/// others.
+/// </summary>
 static class Harness
 {
     static int Main(string[] args)
@@ -72,7 +75,7 @@ static class Harness
         return text.Append("]}").ToString();
     }
 
-    /// <summary>Obeys `delay S`, `push ARRIVAL HEX` and `show NOW` from standard input.</summary>
+    /// <summary>Executes the lines `delay S`, `push ARRIVAL HEX` and `show NOW` of standard input.</summary>
     static void Interpolate()
     {
         var interpolator = new Interpolator();
@@ -118,7 +121,10 @@ static class Harness
         }
     }
 
-    /// <summary>From a line of side, 15 poses and 5 tips, and one of a message in hex, the 15 rotations and the hand's.</summary>
+    /// <summary>
+    /// Reads a line with side, 15 poses and 5 tips and a line with a message in hex; prints 15 rotations and the
+    /// hand's.
+    /// </summary>
     static void Retarget()
     {
         string line;
@@ -144,7 +150,7 @@ static class Harness
         }
     }
 
-    /// <summary>For every bone name read: which bone it means, as side, finger and part.</summary>
+    /// <summary>Prints which bone each name means, as side, finger and part.</summary>
     static void Names()
     {
         string line;
@@ -170,57 +176,59 @@ static class Harness
     }
 
     /// <summary>
-    /// Show at about 90 Hz until standard input ends. For every line read: figures, or for "arrivals" the number and the
-    /// arrival of every frame since the last time.
+    /// Shows at about 90 Hz until standard input ends. Answers "arrivals" with number and time of every frame since the
+    /// last time, and any other line with figures.
     /// </summary>
     static void Live(string address)
     {
         using (var client = new ManipNetClient(address, null, 0.05))
         {
-            var show = new Show { Client = client };
-            var asking = new Thread(() =>
+            var display = new Display { Client = client };
+            var reader = new Thread(() =>
             {
                 string line;
-                while ((line = Console.ReadLine()) != null) Volatile.Write(ref show.Asked, line);
-                Volatile.Write(ref show.Ended, true);
+                while ((line = Console.ReadLine()) != null) Volatile.Write(ref display.Question, line);
+                Volatile.Write(ref display.Ended, true);
             }) { IsBackground = true };
-            asking.Start();
-            while (!Volatile.Read(ref show.Ended))
+            reader.Start();
+            while (!Volatile.Read(ref display.Ended))
             {
-                show.Step();
+                display.Step();
                 Thread.Sleep(1);
-                string asked = Interlocked.Exchange(ref show.Asked, null);
-                if (asked == null) continue;
-                Console.WriteLine(asked == "arrivals" ? show.Arrivals() : show.Figures());
+                string question = Interlocked.Exchange(ref display.Question, null);
+                if (question == null) continue;
+                Console.WriteLine(question == "arrivals" ? display.Arrivals() : display.Figures());
                 Console.Out.Flush();
-                GC.Collect(); // what answering costs does not count
-                show.Collections = GC.CollectionCount(0);
+                GC.Collect(); // the allocations of answers do not count
+                display.Collections = GC.CollectionCount(0);
             }
         }
         Console.WriteLine("closed");
     }
 
-    /// <summary>Never shows anything and blocks the main thread: figures for every line read.</summary>
+    /// <summary>Blocks the main thread and shows nothing; prints figures for every line of standard input.</summary>
     static void Idle(string address)
     {
         using (var client = new ManipNetClient(address, null, 0.05))
         {
-            var show = new Show { Client = client };
-            while (Console.ReadLine() != null) Console.WriteLine(show.Figures());
+            var display = new Display { Client = client };
+            while (Console.ReadLine() != null) Console.WriteLine(display.Figures());
         }
         Console.WriteLine("closed");
     }
 
-    /// <summary>What a program does that shows hands, and notes of it. Allocates nothing but for answers.</summary>
-    sealed class Show
+    /// <summary>
+    /// Shows hands as a program would, and records what it received and showed. Only answers allocate.
+    /// </summary>
+    sealed class Display
     {
         public ManipNetClient Client;
-        public string Asked;
+        public string Question;
         public bool Ended;
         public int Collections;
         readonly HandsFrame _shown = new HandsFrame();
         readonly double[] _seqs = new double[1 << 16], _times = new double[1 << 16];
-        int _noted, _shows;
+        int _recorded, _shows;
         ulong _seq;
         double _due;
         float _weight;
@@ -229,11 +237,11 @@ static class Harness
         {
             Stats stats = Client.GetStats();
             double now = LocalClock.Now;
-            if (stats.Received > 0 && stats.Seq != _seq && _noted < _seqs.Length)
+            if (stats.Received > 0 && stats.Seq != _seq && _recorded < _seqs.Length)
             {
                 _seq = stats.Seq;
-                _seqs[_noted] = _seq;
-                _times[_noted++] = now - stats.AgeS;
+                _seqs[_recorded] = _seq;
+                _times[_recorded++] = now - stats.AgeS;
             }
             if (now < _due) return;
             _due = now + 1.0 / 90.0;
@@ -242,8 +250,8 @@ static class Harness
 
         public string Arrivals()
         {
-            string text = string.Join(",", Enumerable.Range(0, _noted).Select(i => "[" + _seqs[i] + "," + Number(_times[i]) + "]"));
-            _noted = 0;
+            string text = string.Join(",", Enumerable.Range(0, _recorded).Select(i => "[" + _seqs[i] + "," + Number(_times[i]) + "]"));
+            _recorded = 0;
             return "[" + text + "]";
         }
 

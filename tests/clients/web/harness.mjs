@@ -1,5 +1,5 @@
-// Runs the web client for the tests: `decode FILES`, `interpolate`, `live ADDRESS`, `garbage FILE`. Talks in
-// text lines.
+// Runs the web client for the tests, which talk to it in lines of text: `decode FILES`, `interpolate`, `live ADDRESS`
+// and `garbage FILE`.
 import { readFileSync } from "node:fs";
 import { createInterface } from "node:readline";
 import { decode, HandsFrame, Interpolator, ManipNetClient } from "../../../clients/web/manipnet.js";
@@ -56,7 +56,7 @@ async function interpolate() {
 /** Node's performance.now starts with the process; the others' clock is the machine's. */
 const sinceBoot = Number(process.hrtime.bigint()) / 1e9 - performance.now() / 1000;
 
-/** Show at about 90 Hz until standard input ends. For every line: figures, or for "arrivals" those since the last time. */
+/** Shows at about 90 Hz until standard input ends. Answers "arrivals" with arrivals, and any other line with figures. */
 async function live(address) {
   const client = new ManipNetClient(address, { delayS: 0.05 });
   let [shows, seq, arrivals] = [0, -1, []];
@@ -98,7 +98,7 @@ function garbage(path) {
       interpolator.sample(k / RATE_HZ);
     }
   };
-  frames(0, 20_000); // until it is compiled
+  frames(0, 20_000); // the engine compiles it meanwhile
   globalThis.gc();
   const before = process.memoryUsage().heapUsed;
   frames(20_000, 30_000);

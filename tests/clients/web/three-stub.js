@@ -1,4 +1,4 @@
-// What the example page uses of three.js, without drawing: it lets the page run where there is no network.
+// The parts of three.js that the example page uses, without drawing; with it the page runs without a network.
 class Anything {
   constructor() {
     return new Proxy(function () {}, {

@@ -137,7 +137,7 @@ def test_takes_are_found_at_any_depth_and_get_different_names(tmp_path: Path) ->
         ({"--look-ahead": "2"}, "--look-ahead is 2 s; allowed are 0 to 0.5"),
         ({"--mesh": "cube"}, "--mesh cube: must be NAME=FILE"),
         ({"--mesh": "Box=gone.obj"}, "gone.obj"),
-        ({"--model": "gone"}, "model 'gone' is no folder and no shipped bundle"),
+        ({"--model": "gone"}, "model 'gone' is neither a folder nor a shipped bundle"),
     ],
 )
 def test_options_that_no_take_could_use_are_refused_before_any_work(

@@ -42,7 +42,7 @@ def test_it_sees_what_the_product_sees(straightforward: ModuleType, tmp_path: Pa
     state = state_of(HAND, HAND.limits @ [0.6, 0.4])
     for scene in scenes_at(3, [shape, shape])[:2]:
         ours = features(HAND, shape, windows_of([scene]), state.positions[None], state.rotations[None])[0]
-        theirs = slow.features(HAND, scene, state)
+        theirs = slow.features(scene, state)
         for name in BLOCKS:
             apart = np.abs(ours - theirs)[LAYOUT.input[name].columns]
             assert np.quantile(apart, 0.99) < LOOKED_UP_M, name

@@ -87,8 +87,10 @@ def _listen(values: dict[str, Any], seconds: float) -> BodyCollector:
     collector = BodyCollector()
     config = server_config((), values)
     receivers = make_receivers(config.of, collector, Telemetry(), config.host)
-    logging.getLogger("manipnet.inputs").setLevel(logging.ERROR)
+    log = logging.getLogger("manipnet.inputs")
     with ExitStack() as opened:
+        opened.callback(log.setLevel, log.level)
+        log.setLevel(logging.ERROR)
         try:
             start_receivers(receivers, opened)
         except ListenError as error:

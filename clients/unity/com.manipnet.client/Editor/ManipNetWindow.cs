@@ -3,7 +3,9 @@ using UnityEngine;
 
 namespace ManipNet.Client.Unity
 {
-    /// <summary>Is anything arriving? Tries an address without entering play mode, shows receivers, sets up a character.</summary>
+    /// <summary>
+    /// Tests a connection without play mode, shows the state of all receivers, and sets up a character.
+    /// </summary>
     public sealed class ManipNetWindow : EditorWindow
     {
         string _address = "tcp://127.0.0.1:5555";
@@ -34,8 +36,8 @@ namespace ManipNet.Client.Unity
         void OnGUI()
         {
             _address = EditorGUILayout.TextField("Server", _address);
-            if (_client == null && GUILayout.Button("Try")) Try();
-            else if (_client != null && GUILayout.Button("Stop")) Stop();
+            if (_client == null && GUILayout.Button("Test connection")) Connect();
+            else if (_client != null && GUILayout.Button("Stop test")) Stop();
             if (_client != null) Show(_client.GetStats());
             foreach (ManipNetReceiver receiver in Resources.FindObjectsOfTypeAll<ManipNetReceiver>())
             {
@@ -46,22 +48,22 @@ namespace ManipNet.Client.Unity
             EditorGUILayout.Space();
             Animator selected = Selection.activeGameObject == null ? null : Selection.activeGameObject.GetComponent<Animator>();
             EditorGUI.BeginDisabledGroup(selected == null);
-            if (GUILayout.Button("Put fingers on the selected character")) SetUp(selected);
+            if (GUILayout.Button("Add hands to the selected character")) SetUp(selected);
             EditorGUI.EndDisabledGroup();
-            if (selected == null) EditorGUILayout.HelpBox("Select an object with an Animator.", MessageType.Info);
+            if (selected == null) EditorGUILayout.HelpBox("Select an object that has an Animator.", MessageType.Info);
         }
 
         static void Show(Stats stats)
         {
             EditorGUILayout.LabelField("State", stats.State);
             EditorGUILayout.LabelField("Rate", stats.RateHz.ToString("0.0") + " Hz");
-            EditorGUILayout.LabelField("Age", stats.Received == 0 ? "nothing yet" : (1000.0 * stats.AgeS).ToString("0") + " ms");
+            EditorGUILayout.LabelField("Age", stats.Received == 0 ? "no message yet" : (1000.0 * stats.AgeS).ToString("0") + " ms");
             EditorGUILayout.LabelField("Lost, late, refused", stats.Lost + ", " + stats.Late + ", " + stats.Refused);
             if (stats.Received == 0)
-                EditorGUILayout.HelpBox("Nothing has arrived: does the server run, and is this the address in its `ready` line?", MessageType.Info);
+                EditorGUILayout.HelpBox("Nothing has arrived. Check that the server is running and that this is the address in its line `ready`.", MessageType.Info);
         }
 
-        void Try()
+        void Connect()
         {
             try
             {

@@ -2,14 +2,14 @@ using UnityEngine;
 
 namespace ManipNet.Client.Unity
 {
-    /// <summary>Moves this object with a tracked body, at the same instant as the fingers on it.</summary>
+    /// <summary>Moves this object with a tracked body, in step with the fingers that touch it.</summary>
     [AddComponentMenu("ManipNet/ManipNet Body")]
     [DefaultExecutionOrder(100)]
     public sealed class ManipNetBody : MonoBehaviour
     {
         [SerializeField] ManipNetReceiver receiver;
 
-        [Tooltip("The body's name in the stream.")]
+        [Tooltip("Name of the body in the stream.")]
         [SerializeField] string body = "";
 
         void LateUpdate()

@@ -4,8 +4,8 @@ using UnityEngine;
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// Fingers on a rig: a Humanoid's, or bones found by name under `root`. The pose the rig has when this is enabled
-    /// counts as its rest pose, whatever it is.
+    /// Moves the fingers of a rig, which is a Humanoid or has bones with known names under `root`. The rig's pose at
+    /// the moment when this component is enabled counts as its rest pose.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Hand")]
     [DefaultExecutionOrder(100)]
@@ -14,16 +14,16 @@ namespace ManipNet.Client.Unity
         [SerializeField] ManipNetReceiver receiver;
         [SerializeField] Side side = Side.Right;
 
-        [Tooltip("A Humanoid whose fingers to drive; or leave it empty and set the root.")]
+        [Tooltip("Humanoid whose fingers move. Leave it empty to use bones by name under the root.")]
         [SerializeField] Animator animator;
 
-        [Tooltip("Where to look for bones by name: Unity, VMC, Mixamo, Unreal, Rigify and VRoid names are understood.")]
+        [Tooltip("Object under which bones are found by the names of Unity, VMC, Mixamo, Unreal, Rigify or VRoid.")]
         [SerializeField] Transform root;
 
-        [Tooltip("Make bones point where the synthesised ones do, whatever the rest pose of the rig is.")]
+        [Tooltip("Makes the bones point where the synthesised ones do, whatever the rest pose of the rig is.")]
         [SerializeField] bool correctRestPose = true;
 
-        [Tooltip("Move the hand to the tracked wrist too. Off if something else places the arms.")]
+        [Tooltip("Also moves the hand to the tracked wrist. Turn it off if something else moves the arms.")]
         [SerializeField] bool moveWrist;
 
         readonly Transform[] _bones = new Transform[HandRig.BoneCount];
@@ -48,8 +48,8 @@ namespace ManipNet.Client.Unity
             var missing = new List<string>();
             FindBones(missing);
             if (missing.Count > 0)
-                Debug.LogError("ManipNet: no bone for " + string.Join(", ", missing.ToArray()) + " of the " + side
-                    + " hand; give a Humanoid, or a root whose bones have names it knows", this);
+                Debug.LogError("ManipNet: no bone for " + string.Join(", ", missing.ToArray()) + " of the " + (side == Side.Left ? "left" : "right")
+                    + " hand; use a Humanoid, or a root whose bones have known names", this);
             else
                 _rig = Bind();
         }

@@ -3,8 +3,9 @@ using UnityEngine;
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// The 26 joints of a hand, named and turned as in Unity's XR Hands (+z to the finger tip, +y out of the back), on
-    /// children whose names end in the joint's name, as in L_IndexProximal. Missing ones are made.
+    /// Moves the children whose names end in a joint's name, as L_IndexProximal does, with the 26 joints of a hand.
+    /// Names and axes are those of Unity's XR Hands (+z to the finger tip, +y out of the back). Missing children are
+    /// created.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Joints")]
     [DefaultExecutionOrder(100)]
@@ -13,7 +14,7 @@ namespace ManipNet.Client.Unity
         [SerializeField] ManipNetReceiver receiver;
         [SerializeField] Side side = Side.Right;
 
-        [Tooltip("Shown at every joint that had to be made; may be empty.")]
+        [Tooltip("Object that is shown at every created joint; may be empty.")]
         [SerializeField] GameObject marker;
 
         readonly Transform[] _joints = new Transform[Layout.JointCount];
@@ -25,7 +26,7 @@ namespace ManipNet.Client.Unity
             marker = shown;
         }
 
-        /// <summary>XR Hands' name of a joint: index_proximal is IndexProximal.</summary>
+        /// <summary>The name of a joint in XR Hands, for example IndexProximal for index_proximal.</summary>
         public static string JointName(int joint)
         {
             string name = "";
@@ -40,11 +41,11 @@ namespace ManipNet.Client.Unity
             {
                 foreach (Transform t in all)
                     if (t.name.EndsWith(JointName(i), System.StringComparison.OrdinalIgnoreCase)) _joints[i] = t;
-                if (_joints[i] == null) _joints[i] = Make(JointName(i));
+                if (_joints[i] == null) _joints[i] = Create(JointName(i));
             }
         }
 
-        Transform Make(string jointName)
+        Transform Create(string jointName)
         {
             GameObject made = marker == null ? new GameObject() : Instantiate(marker);
             made.name = jointName;
@@ -59,7 +60,7 @@ namespace ManipNet.Client.Unity
             if (!hand.Present) return;
             for (int k = 0; k < _joints.Length; k++)
             {
-                int i = k < 2 ? 1 - k : k; // the wrist before the palm, which hangs on it in XR Hands' rigs
+                int i = k < 2 ? 1 - k : k; // the wrist comes first, because it is the palm's parent in XR Hands
                 _joints[i].position = ManipNetPose.Position(hand.Joints, 7 * i);
                 _joints[i].rotation = ManipNetPose.Rotation(hand.Joints, 7 * i) * ManipNetPose.ForwardAlongBone;
             }

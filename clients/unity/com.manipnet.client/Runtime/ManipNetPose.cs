@@ -2,19 +2,23 @@ using UnityEngine;
 
 namespace ManipNet.Client.Unity
 {
-    /// <summary>From the project's axes (right-handed, Y up, metres) to Unity's (left-handed): x is reversed.</summary>
+    /// <summary>
+    /// Converts from the project's axes (right-handed, Y up, metres) to Unity's (left-handed) by reversing x.
+    /// </summary>
     public static class ManipNetPose
     {
-        /// <summary>XR Hands points a joint's +z to the finger tip, OpenXR its -z.</summary>
+        /// <summary>
+        /// The rotation from OpenXR's joints, whose -z points to the finger tip, to XR Hands', whose +z does.
+        /// </summary>
         public static readonly Quaternion ForwardAlongBone = new Quaternion(0f, 1f, 0f, 0f);
 
-        /// <summary>Position of the pose that begins at values[at].</summary>
+        /// <summary>The position of the pose that begins at values[at].</summary>
         public static Vector3 Position(float[] values, int at)
         {
             return ToUnity(UnityAxes.Position(values, at));
         }
 
-        /// <summary>Rotation of the pose that begins at values[at].</summary>
+        /// <summary>The rotation of the pose that begins at values[at].</summary>
         public static Quaternion Rotation(float[] values, int at)
         {
             return ToUnity(UnityAxes.Rotation(values, at + 3));

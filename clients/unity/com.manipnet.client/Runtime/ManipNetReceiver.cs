@@ -4,27 +4,29 @@ using UnityEngine;
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// Receives hands while it is enabled, on a thread of its own, and makes the pose to show once per frame, before the
+    /// Receives hands on its own thread while it is enabled, and computes the pose to show once per frame, before the
     /// components that use it.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Receiver")]
     [DefaultExecutionOrder(-100)]
     public sealed class ManipNetReceiver : MonoBehaviour
     {
-        [Tooltip("As the server's `ready` line tells it.")]
+        [Tooltip("Address for hands in the server's line `ready`.")]
         [SerializeField] string address = "tcp://127.0.0.1:5555";
 
-        [Tooltip("Whose hands; empty for the first seen.")]
+        [Tooltip("Actor whose hands are shown; empty for the first one received.")]
         [SerializeField] string actor = "";
 
-        [Tooltip("Seconds behind the newest frame, to bridge jitter and losses. 0.05 will do on one machine.")]
+        [Tooltip("Seconds by which the hands are shown late, to bridge jitter and lost frames. 0.05 is enough on one machine.")]
         [SerializeField, Range(0f, 0.5f)] float delay = 0.1f;
 
         readonly HandsFrame _hands = new HandsFrame();
         ManipNetClient _client;
         float _weight;
 
-        /// <summary>The pose to show this frame, in the project's axes (right-handed): see ManipNetPose.</summary>
+        /// <summary>
+        /// The pose to show in this frame, in the project's axes (right-handed); ManipNetPose converts it.
+        /// </summary>
         public HandsFrame Hands
         {
             get { return _hands; }
@@ -32,7 +34,7 @@ namespace ManipNet.Client.Unity
 
         public bool HasHands { get; private set; }
 
-        /// <summary>Falls from 1 to 0 when the stream is lost.</summary>
+        /// <summary>The weight of the pose, which falls from 1 to 0 when the stream is lost.</summary>
         public float Weight
         {
             get { return _weight; }
@@ -68,7 +70,7 @@ namespace ManipNet.Client.Unity
             }
         }
 
-        /// <summary>Also called before scripts are reloaded: the thread must not outlive them.</summary>
+        /// <summary>Unity also calls this before it reloads scripts, which the thread must not outlive.</summary>
         void OnDisable()
         {
             if (_client != null) _client.Dispose();

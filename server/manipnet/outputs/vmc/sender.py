@@ -1,6 +1,6 @@
-"""Hands out as VMC (Virtual Motion Capture) bones: for receivers that exist already, over OSC and UDP.
+"""Sends hands as VMC (Virtual Motion Capture) bones, over OSC and UDP.
 
-One bundle per hand has 1472 bytes, which is what a 1500-byte packet holds after its IP and UDP headers.
+There is one bundle for each hand, of 1472 bytes, which just fits into a 1500-byte packet with its IP and UDP headers.
 Source: VMC protocol specification, marionette side.
 """
 
@@ -14,10 +14,10 @@ from manipnet.wire import SIDES
 
 
 class VmcSender(HandsOutput):
-    """Sends every message's hands to one receiver. Not thread-safe."""
+    """Sends the hands of each message to one receiver."""
 
     def __init__(self, host: str, port: int, hand: Hand) -> None:
-        """`hand` is the one that the messages describe."""
+        """`hand` is the hand that the messages describe."""
         self._address = (host, port)
         self._skeleton = VmcSkeleton(hand)
         self._bundles = {side: HandBundle(bone_names(side)) for side in SIDES}

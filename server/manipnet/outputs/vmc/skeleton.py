@@ -1,4 +1,4 @@
-"""The bones of a VMC receiver as they follow one hand.
+"""The poses of a VMC receiver's bones for the pose of a hand.
 
 Rotations are local and relative to the receiver's T-pose (arms out, palms down, fingers straight), left-handed, Y up,
 as in Unity. Source: VMC protocol specification, marionette side.
@@ -14,7 +14,7 @@ from manipnet.wire import HandPose
 from manipnet.wire.hand_names import BONE_NAMES
 
 FOREARM_M = 0.25
-"""Where the hand sits in the forearm, for receivers that apply positions too: nobody tracks the elbow."""
+"""Distance from the elbow to the hand, for receivers that apply positions too. The elbow is not tracked."""
 
 _PARTS = ("Proximal", "Intermediate", "Distal")
 FINGER_BONES = {f"Thumb{part}": 2 + i for i, part in enumerate(_PARTS)} | {
@@ -22,9 +22,9 @@ FINGER_BONES = {f"Thumb{part}": 2 + i for i, part in enumerate(_PARTS)} | {
     for i, finger in enumerate(("Index", "Middle", "Ring", "Little"))
     for j, part in enumerate(_PARTS)
 }
-"""VMC's finger bones, after "Left" or "Right", and our bone each follows.
+"""VMC's finger bones, without "Left" or "Right", and the index of the bone that each one follows.
 
-The two carpal angles multiply into what Unity calls ThumbProximal, so the thumb's names sit one joint lower.
+Unity's ThumbProximal has both carpal angles of the thumb, so the names of the thumb's bones are one joint lower.
 """
 
 _BONES = np.array(list(FINGER_BONES.values()))
@@ -32,11 +32,11 @@ _LEVELS = ([1, 5, 8, 11, 14], [2, 6, 9, 12, 15], [3, 7, 10, 13, 16], [4])
 _BONE_COUNT = len(BONE_NAMES)
 
 _WRIST_TO_T_POSE = matrix_to_quat(np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
-"""A right wrist in T-pose, in the project frame of a person facing +z: fingers to -x, thumb to +z, back of hand up."""
+"""A right wrist in T-pose, for a person who faces +z: fingers to -x, thumb to +z, back of the hand up."""
 
 _T_POSE_DIRECTIONS = np.tile([1.0, 0.0, 0.0], (_BONE_COUNT, 1))
 _T_POSE_DIRECTIONS[1:5] = [np.sqrt(0.5), np.sqrt(0.5), 0.0]
-"""Where each bone of the receiver's T-pose points, in the wrist frame: fingers along the hand, thumb at 45 degrees."""
+"""The direction of each bone in the receiver's T-pose, in the wrist frame: fingers straight, thumb at 45 degrees."""
 
 
 def bone_names(side: Side) -> list[str]:
@@ -45,10 +45,10 @@ def bone_names(side: Side) -> list[str]:
 
 
 class VmcSkeleton:
-    """The receiver's bones as they follow one hand.
+    """Computes the poses of the receiver's bones.
 
-    `rest_pose_correction` turns each bone by what its direction at angle zero differs from the T-pose's, so that
-    bones point where the hand's do; without it angle zero shows as the T-pose.
+    With `rest_pose_correction`, each bone is turned by the difference between its directions at angle zero and in the
+    T-pose, so that it points where the hand's bone does. Without it, angle zero appears as the T-pose.
     """
 
     def __init__(self, hand: Hand, rest_pose_correction: bool = True) -> None:
@@ -68,11 +68,11 @@ class VmcSkeleton:
         fingers = quat_multiply(quat_conjugate(turns[self._bone_parents]), turns[_BONES])
         wrist = np.concatenate([[-FOREARM_M, 0.0, 0.0], _hand_turn(side, pose)])
         poses = np.vstack([wrist, np.hstack([self._offsets, fingers])])
-        # So far it is a right hand. A left one is its mirror image, and Unity's axes mirror once more.
+        # These are poses of a right hand. A left hand is its mirror image, and Unity's axes mirror it once more.
         return to_unity(poses) if side == "right" else poses
 
     def _turns_from_t_pose(self, local: Array) -> Array:
-        """How far each bone of a right hand is turned from the T-pose, `(17, 4)`, in the T-pose's project frame."""
+        """The rotation of each bone of a right hand from the T-pose, `(17, 4)`, in the project frame of the T-pose."""
         world = np.empty((_BONE_COUNT, 4))
         world[0] = [0.0, 0.0, 0.0, 1.0]
         for bones in _LEVELS:
@@ -81,14 +81,14 @@ class VmcSkeleton:
         return quat_multiply(quat_multiply(_WRIST_TO_T_POSE, turns), quat_conjugate(_WRIST_TO_T_POSE))
 
     def _rest_pose_correction(self, hand: Hand) -> Array:
-        """Of each finger bone the shortest turn from its T-pose direction to its direction at angle zero, `(15, 4)`."""
+        """The shortest rotation of each finger bone from its direction in T-pose to that at angle zero, `(15, 4)`."""
         children = [hand.parents.tolist().index(bone) for bone in _BONES]
         along = self._zero_positions[children] - self._zero_positions[_BONES]
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         return np.stack([_shortest_turn(*ends) for ends in zip(_T_POSE_DIRECTIONS[_BONES], along, strict=True)])
 
     def _t_pose_offsets(self) -> Array:
-        """Where each bone starts in its parent `(15, 3)`: knuckles where they are, then straight along the finger."""
+        """The start of each bone in its parent `(15, 3)`: knuckles where the hand has them, then straight fingers."""
         parents = self._bone_parents
         offsets = self._zero_positions[_BONES] - self._zero_positions[parents]
         lengths = np.linalg.norm(offsets, axis=1, keepdims=True)
@@ -97,7 +97,7 @@ class VmcSkeleton:
 
 
 def _hand_turn(side: Side, hand: HandPose) -> Array:
-    """The wrist's turn from the T-pose, as of a right hand."""
+    """The rotation of the wrist from the T-pose, as that of a right hand."""
     q = hand.wrist[3:] if side == "right" else mirror_quats(hand.wrist[3:])
     return quat_multiply(q, quat_conjugate(_WRIST_TO_T_POSE))
 

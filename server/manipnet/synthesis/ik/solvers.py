@@ -25,13 +25,11 @@ SOLVERS: Final = {
     for solver in (
         Solver(
             "least_squares",
-            "damped least squares: joints to their targets, fingers out of the object and onto it",
+            "damped least squares on joints and surfaces",
             f"{_CORRECTION}:correct_by_least_squares",
         ),
-        Solver(
-            "ccd", "cyclic coordinate descent as in the paper: joints to their targets", f"{_CORRECTION}:correct_by_ccd"
-        ),
-        Solver("none", "no inverse kinematics: the network's pose as it is", f"{_CORRECTION}:correct_nothing"),
+        Solver("ccd", "the paper's cyclic coordinate descent", f"{_CORRECTION}:correct_by_ccd"),
+        Solver("none", "no correction", f"{_CORRECTION}:correct_nothing"),
     )
 }
 """Every solver by name."""

@@ -2,6 +2,7 @@
 
 import logging
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -21,8 +22,8 @@ def read_cached(path: Path) -> tuple[Bvh, Field] | None:
             return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
     except FileNotFoundError:
         return None
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        _log.warning("shape cache %s is unreadable (%s); building the shape again", path, error)
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+        _log.warning("the cached shape %s is damaged (%s), so the shape is built again", path, error)
         return None
 
 
@@ -33,4 +34,4 @@ def write_cached(path: Path, bvh: Bvh, field: Field) -> None:
         with replacing(path) as file:
             np.savez(file, **bvh._asdict(), **field._asdict())
     except OSError as error:
-        _log.warning("shape cache %s cannot be written (%s); the next start builds it again", path, error)
+        _log.warning("the shape %s cannot be cached (%s), so the next start builds it again", path, error)

@@ -1,4 +1,4 @@
-// The few types of the engine that the plugin uses, just working enough to run it without Unreal.
+// The types of the engine that the plugin uses, complete enough to run it without Unreal.
 #pragma once
 
 #include <cstdint>

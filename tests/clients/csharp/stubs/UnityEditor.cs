@@ -1,4 +1,4 @@
-// The few types of the editor and of NUnit that the package uses: enough to compile against.
+// The types of the editor and of NUnit that the package uses, complete enough to compile it.
 using System;
 using System.Collections.Generic;
 using UnityEngine;
@@ -20,7 +20,7 @@ namespace UnityEditor
         public static event Action beforeAssemblyReload { add { } remove { } }
     }
 
-    /// <summary>Drawn keeps what was drawn, Typed is what a person types.</summary>
+    /// <summary>Drawn holds the lines that were drawn, and Typed is the text that a user types.</summary>
     public static class EditorGUILayout
     {
         public static readonly List<string> Drawn = new List<string>();

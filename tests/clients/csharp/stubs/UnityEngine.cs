@@ -1,4 +1,4 @@
-// The few types of the engine that the package uses, just working enough to run its components without Unity.
+// The types of the engine that the package uses, complete enough to run its components without Unity.
 using System;
 using System.Collections.Generic;
 using System.Linq;
@@ -130,7 +130,7 @@ namespace UnityEngine
         public static T[] FindObjectsOfTypeAll<T>() { return GameObject.Everything.OfType<T>().ToArray(); }
     }
 
-    /// <summary>Whoever sets Pressed presses the button of that name, once.</summary>
+    /// <summary>Setting Pressed presses the button of that name once.</summary>
     public static class GUILayout
     {
         public static string Pressed;

@@ -12,13 +12,13 @@ namespace ManipNet.Client
 
         public int Length { get; private set; }
 
-        /// <summary>The text; allocates only when it has changed since it was last asked for.</summary>
+        /// <summary>The text. Getting it allocates only if it has changed since the last time.</summary>
         public string Text
         {
             get { return _text ?? (_text = Utf8.GetString(_bytes, 0, Length)); }
         }
 
-        /// <summary>Take over a name from a record. False when it is too long or not UTF-8.</summary>
+        /// <summary>Copies a name from a record. Returns false if it is too long or not UTF-8.</summary>
         public bool Read(byte[] data, int offset)
         {
             int length = data[offset];

@@ -2,7 +2,7 @@ using System;
 
 namespace ManipNet.Client
 {
-    /// <summary>Three numbers; what Unity's Vector3 is, without the engine.</summary>
+    /// <summary>A vector, like Unity's Vector3 but without the engine.</summary>
     public struct Vec3
     {
         public float X, Y, Z;
@@ -50,7 +50,7 @@ namespace ManipNet.Client
         }
     }
 
-    /// <summary>A unit quaternion; what Unity's Quaternion is, without the engine.</summary>
+    /// <summary>A unit quaternion, like Unity's Quaternion but without the engine.</summary>
     public struct Quat
     {
         public float X, Y, Z, W;
@@ -87,14 +87,14 @@ namespace ManipNet.Client
             return v + W * t + Vec3.Cross(u, t);
         }
 
-        /// <summary>The shortest turn that carries one direction into another.</summary>
+        /// <summary>The shortest rotation from one direction to another.</summary>
         public static Quat FromTo(Vec3 from, Vec3 to)
         {
             from = from.Normalized;
             to = to.Normalized;
             float w = 1f + Vec3.Dot(from, to);
             Vec3 axis = Vec3.Cross(from, to);
-            if (w < 1e-6f) // opposite: half a turn about anything across
+            if (w < 1e-6f) // opposite directions: half a turn about any perpendicular axis
             {
                 axis = Vec3.Cross(from, Math.Abs(from.X) < 0.7f ? new Vec3(1f, 0f, 0f) : new Vec3(0f, 1f, 0f));
                 w = 0f;
@@ -112,7 +112,9 @@ namespace ManipNet.Client
         }
     }
 
-    /// <summary>The project frame (right-handed, Y up, metres) seen in Unity's (left-handed): x is reversed.</summary>
+    /// <summary>
+    /// Converts from the project's axes (right-handed, Y up, metres) to Unity's (left-handed) by reversing x.
+    /// </summary>
     public static class UnityAxes
     {
         public static Vec3 Position(float[] values, int at)

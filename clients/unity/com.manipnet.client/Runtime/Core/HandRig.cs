@@ -3,8 +3,8 @@ using System;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// Poses the finger bones of any rig. The rig's bones may have any axes and lengths: what counts is where they point
-    /// in the bind pose. All is in the space of the rig's hand bone, Unity axes.
+    /// Poses the finger bones of any rig. Its bones may have any axes and lengths, because only their directions in the
+    /// bind pose are used. All poses are in the space of the rig's hand bone, in Unity's axes.
     /// </summary>
     public sealed class HandRig
     {
@@ -18,11 +18,11 @@ namespace ManipNet.Client
         readonly Quat[] _bind = new Quat[BoneCount];
         readonly Quat _wristToHand;
 
-        /// <param name="side">Which hand the rig's is.</param>
+        /// <param name="side">The side of the rig's hand.</param>
         /// <param name="positions">15 bind positions, thumb to little finger, proximal to distal.</param>
         /// <param name="rotations">15 bind rotations in the same order.</param>
         /// <param name="tips">5 finger tips in the bind pose.</param>
-        /// <param name="correctRestPose">Turn each bone so that it points where ours does, whatever the bind pose is.</param>
+        /// <param name="correctRestPose">Whether bones point where the hand's do, or only turn as much.</param>
         public HandRig(Side side, Vec3[] positions, Quat[] rotations, Vec3[] tips, bool correctRestPose = true)
         {
             _wristToHand = Frame(positions[Middle], positions[Index] - positions[Little])
@@ -36,13 +36,13 @@ namespace ManipNet.Client
             }
         }
 
-        /// <summary>The rotation of the rig's hand bone that puts it where the tracked wrist is.</summary>
+        /// <summary>The rotation of the rig's hand bone that follows the tracked wrist.</summary>
         public Quat HandRotation(HandFrame hand)
         {
             return UnityAxes.Rotation(hand.Wrist, 3) * _wristToHand.Inverse;
         }
 
-        /// <summary>Rotations of the 15 finger bones in the space of the rig's hand bone.</summary>
+        /// <summary>Computes the rotations of the 15 finger bones in the space of the rig's hand bone.</summary>
         public void Solve(HandFrame hand, Quat[] output)
         {
             _world[0] = _wristToHand;
@@ -52,7 +52,8 @@ namespace ManipNet.Client
         }
 
         /// <summary>
-        /// Our two carpal thumb angles multiply into what Unity calls ThumbProximal, so thumbs start one bone later.
+        /// The hand's bone for a finger bone of the rig. Unity's ThumbProximal combines the two carpal angles of the
+        /// thumb, so the thumb begins one bone later.
         /// </summary>
         static int OurBone(int i)
         {
@@ -65,7 +66,10 @@ namespace ManipNet.Client
             return i % 3 == 2 ? Layout.BoneCount + i / 3 : OurBone(i) + 1;
         }
 
-        /// <summary>The stored pose is a right hand in the project frame; Unity's axes mirror it, and so is a left hand.</summary>
+        /// <summary>
+        /// The stored pose is a right hand in the project's axes. Converting to Unity's axes mirrors it, as does a left
+        /// hand.
+        /// </summary>
         static Vec3 ZeroPosition(Side side, int joint)
         {
             float[] p = Layout.ZeroPositions;
@@ -80,7 +84,7 @@ namespace ManipNet.Client
             return side == Side.Right ? UnityAxes.Rotation(q, at) : new Quat(q[at], q[at + 1], q[at + 2], q[at + 3]);
         }
 
-        /// <summary>The orientation with x along the hand and y toward `across`.</summary>
+        /// <summary>The rotation of a frame with x along `along` and y towards `across`.</summary>
         static Quat Frame(Vec3 along, Vec3 across)
         {
             Quat first = Quat.FromTo(new Vec3(1f, 0f, 0f), along);

@@ -2,17 +2,21 @@ using System;
 
 namespace ManipNet.Client
 {
-    /// <summary>Reads the payload of `pose/bin`, see docs/protocol.md. Allocates only to explain a refusal.</summary>
+    /// <summary>
+    /// Decodes the payload of `pose/bin`, which docs/protocol.md describes. Allocates only to explain a refusal.
+    /// </summary>
     public static class HandsDecoder
     {
-        /// <summary>Null when the frame was read, else what was wrong; the frame is then in an undefined state.</summary>
+        /// <summary>
+        /// Fills the frame and returns null, or returns what is wrong and leaves the frame in an undefined state.
+        /// </summary>
         public static string Decode(byte[] data, int start, int length, HandsFrame frame)
         {
             if (length < Layout.HeaderBytes || BitConverter.ToInt32(data, start) != Layout.Magic)
-                return "not a pose/bin message: it must start with MNPL and a whole header";
+                return "the message is not pose/bin; it must begin with MNPL and a complete header";
             int version = U16(data, start + Layout.HeaderVersion);
             if (version != Layout.Version)
-                return "message is of version " + version + "; this reader understands version " + Layout.Version;
+                return "the message has version " + version + "; this client understands version " + Layout.Version;
             int headerSize = U16(data, start + Layout.HeaderHeaderSize);
             int handSize = U16(data, start + Layout.HeaderHandSize);
             int bodySize = U16(data, start + Layout.HeaderBodySize);
@@ -21,10 +25,10 @@ namespace ManipNet.Client
             if (headerSize < Layout.HeaderBytes || handSize < Layout.HandBytes || bodySize < Layout.BodyBytes)
                 return "a record is shorter than its fields";
             if (hands > 2 || bodies > Layout.MaxBodies)
-                return hands + " hands and " + bodies + " bodies; 2 and " + Layout.MaxBodies + " are allowed";
+                return "the message has " + hands + " hands and " + bodies + " bodies; at most 2 and " + Layout.MaxBodies + " are allowed";
             int total = headerSize + hands * handSize + bodies * bodySize;
             if (length != total || BitConverter.ToUInt32(data, start + Layout.HeaderTotalSize) != total)
-                return "message has " + length + " bytes; its header promises " + total;
+                return "the message has " + length + " bytes, but its header says " + total;
 
             string error = Header(data, start, frame);
             int at = start + headerSize;
@@ -43,7 +47,7 @@ namespace ManipNet.Client
             frame.Left.Present = frame.Right.Present = false;
             double times = frame.TCapture + frame.TPublish + frame.LookAhead;
             if (!IsFinite(times) || !Floats(data, at + Layout.HeaderLatencyMs, frame.LatencyMs))
-                return "the header holds a number that is not finite";
+                return "the header has a number that is not finite";
             if (!frame.Session.Read(data, at + Layout.HeaderSession) || !frame.Actor.Read(data, at + Layout.HeaderActor))
                 return "the name of the session or the actor is too long or not UTF-8";
             return null;
@@ -53,10 +57,10 @@ namespace ManipNet.Client
         {
             int side = data[at + Layout.HandSide];
             int state = data[at + Layout.HandState];
-            if (side > 1) return "side is " + side + "; allowed are 0 (left) and 1 (right)";
-            if (state > 2) return "state is " + state + "; allowed are 0 (live), 1 (hold) and 2 (rest)";
+            if (side > 1) return "the side is " + side + "; allowed are 0 (left) and 1 (right)";
+            if (state > 2) return "the state is " + state + "; allowed are 0 (live), 1 (hold) and 2 (rest)";
             HandFrame hand = frame.Hand((Side)side);
-            if (hand.Present) return "the same hand occurs twice; once is allowed";
+            if (hand.Present) return "the same hand occurs twice; it may occur once";
             hand.Present = true;
             hand.State = (HandState)state;
             hand.HasObject = data[at + Layout.HandHasObject] != 0;
@@ -67,14 +71,14 @@ namespace ManipNet.Client
                 & Floats(data, at + Layout.HandRotations, hand.Rotations)
                 & Floats(data, at + Layout.HandWrist, hand.Wrist)
                 & Floats(data, at + Layout.HandJoints, hand.Joints);
-            return finite ? null : "a hand holds a number that is not finite";
+            return finite ? null : "a hand has a number that is not finite";
         }
 
         static string Body(byte[] data, int at, BodyFrame body)
         {
             body.Tracked = data[at + Layout.BodyTracked] != 0;
             if (!body.Name.Read(data, at + Layout.BodyName)) return "a body's name is too long or not UTF-8";
-            return Floats(data, at + Layout.BodyPose, body.Pose) ? null : "a body holds a number that is not finite";
+            return Floats(data, at + Layout.BodyPose, body.Pose) ? null : "a body has a number that is not finite";
         }
 
         static bool Floats(byte[] data, int at, float[] into)

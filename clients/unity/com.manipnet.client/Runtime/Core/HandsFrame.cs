@@ -6,7 +6,7 @@ namespace ManipNet.Client
 
     public enum HandState { Live = 0, Hold = 1, Rest = 2 }
 
-    /// <summary>One hand in the project frame: right-handed, Y up, metres, quaternions xyzw.</summary>
+    /// <summary>One hand in the project's axes: right-handed, Y up, metres, quaternions xyzw.</summary>
     public sealed class HandFrame
     {
         public bool Present;
@@ -18,13 +18,13 @@ namespace ManipNet.Client
         /// <summary>20 joint angles, radians, in the order of Layout.AngleNames.</summary>
         public readonly float[] Angles = new float[Layout.AngleCount];
 
-        /// <summary>17 quaternions local to the parent bone, in the order of Layout.BoneNames.</summary>
+        /// <summary>17 quaternions relative to the parent bone, in the order of Layout.BoneNames.</summary>
         public readonly float[] Rotations = new float[4 * Layout.BoneCount];
 
-        /// <summary>The wrist in the world: position, quaternion.</summary>
+        /// <summary>The position and quaternion of the wrist in the world.</summary>
         public readonly float[] Wrist = new float[7];
 
-        /// <summary>26 OpenXR joints in the world: position, quaternion each.</summary>
+        /// <summary>The position and quaternion of each of 26 OpenXR joints in the world.</summary>
         public readonly float[] Joints = new float[7 * Layout.JointCount];
 
         public void CopyFrom(HandFrame other)
@@ -41,7 +41,7 @@ namespace ManipNet.Client
         }
     }
 
-    /// <summary>A tracked body in the world: position, quaternion.</summary>
+    /// <summary>A tracked body with its position and quaternion in the world.</summary>
     public sealed class BodyFrame
     {
         public readonly FixedName Name = new FixedName();
@@ -56,7 +56,7 @@ namespace ManipNet.Client
         }
     }
 
-    /// <summary>One message, in memory that is used again and again.</summary>
+    /// <summary>One message, in memory that is reused.</summary>
     public sealed class HandsFrame
     {
         public readonly FixedName Session = new FixedName();
@@ -66,7 +66,7 @@ namespace ManipNet.Client
         public double TPublish;
         public double LookAhead;
 
-        /// <summary>buffer, sense, infer, ik, total.</summary>
+        /// <summary>The times buffer, sense, infer, ik and total, in milliseconds.</summary>
         public readonly float[] LatencyMs = new float[5];
 
         public readonly HandFrame Left = new HandFrame();
@@ -84,7 +84,7 @@ namespace ManipNet.Client
             return _bodies[index];
         }
 
-        /// <summary>Make room for so many bodies; allocates only when there were never as many.</summary>
+        /// <summary>Sets the number of bodies. Allocates only if there have never been as many.</summary>
         public void SetBodyCount(int count)
         {
             if (count > _bodies.Length)

@@ -3,8 +3,8 @@ using System;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// Shows hands smoothly at any display rate: by capture time, a chosen delay behind, held then faded on loss.
-    /// Not thread-safe. Allocates nothing after construction.
+    /// Interpolates hands by capture time, a chosen delay behind, for any display rate; holds and then fades them on
+    /// loss. Not thread-safe. Allocates nothing after construction.
     /// </summary>
     public sealed class Interpolator
     {
@@ -24,10 +24,10 @@ namespace ManipNet.Client
 
         public double DelayS = 0.1;
 
-        /// <summary>Frames that came too late to be of use.</summary>
+        /// <summary>The number of frames that came too late to be shown.</summary>
         public long Late { get; private set; }
 
-        /// <summary>Hand over a frame that arrived at the local time `arrival`, and get one to fill next.</summary>
+        /// <summary>Adds a frame that arrived at the local time `arrival`, and returns a frame to fill next.</summary>
         public HandsFrame Push(HandsFrame frame, double arrival, out bool taken)
         {
             taken = Accept(frame, arrival);
@@ -45,8 +45,8 @@ namespace ManipNet.Client
         }
 
         /// <summary>
-        /// What to show at the local time `now`, which must not fall. False before the first frame. `weight` falls from
-        /// 1 to 0 when the stream is lost: mix your own animation in by it.
+        /// Computes the hands to show at the local time `now`, which must not decrease. Returns false before the first
+        /// frame. `weight` falls from 1 to 0 when the stream is lost; use it to blend to another animation.
         /// </summary>
         public bool Sample(double now, HandsFrame output, out float weight)
         {
@@ -76,7 +76,9 @@ namespace ManipNet.Client
             return true;
         }
 
-        /// <summary>Another session, or the sender's clock set back, as when a take loops.</summary>
+        /// <summary>
+        /// Begins anew, for a new session or after the sender's clock went back, as when a take loops.
+        /// </summary>
         void Restart(HandsFrame frame)
         {
             _ring.Clear();
@@ -86,7 +88,9 @@ namespace ManipNet.Client
             _starved = _hasShown;
         }
 
-        /// <summary>Backlog after a stall; but if everything is late for long, it is the clock that has changed.</summary>
+        /// <summary>
+        /// Whether the frame is backlog after a stall; if frames stay late for long, the clock has changed instead.
+        /// </summary>
         bool IsStale(HandsFrame frame, double arrival)
         {
             if (arrival - frame.TCapture - _clock.Target <= StaleS)
@@ -100,7 +104,7 @@ namespace ManipNet.Client
             return false;
         }
 
-        /// <summary>After a gap, glide from the pose that was held to the stream.</summary>
+        /// <summary>Blends with the held pose for a short time after a gap.</summary>
         void Ease(HandsFrame output, double starved, double now)
         {
             if (starved > 1.0 / Layout.RateHz)

@@ -2,7 +2,7 @@ using System.Diagnostics;
 
 namespace ManipNet.Client
 {
-    /// <summary>Seconds of a clock that never goes back.</summary>
+    /// <summary>A clock in seconds that never goes back.</summary>
     public static class LocalClock
     {
         static readonly double Period = 1.0 / Stopwatch.Frequency;

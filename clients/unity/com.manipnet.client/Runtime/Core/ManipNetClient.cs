@@ -5,12 +5,12 @@ using System.Threading;
 
 namespace ManipNet.Client
 {
-    /// <summary>What a status line shows.</summary>
+    /// <summary>The state and the counters of a client.</summary>
     public struct Stats
     {
         public string State;
 
-        /// <summary>Frames that arrived; Late ones of these came too late to be shown.</summary>
+        /// <summary>Readable frames that arrived; Late are those of them that came too late to be shown.</summary>
         public long Received, Late;
 
         /// <summary>Frames that never arrived.</summary>
@@ -20,20 +20,22 @@ namespace ManipNet.Client
         public long Refused;
         public int Connections;
 
-        /// <summary>Number of the newest frame, as the server counts them.</summary>
+        /// <summary>The server's number of the newest frame.</summary>
         public ulong Seq;
         public double RateHz;
 
-        /// <summary>Seconds since the newest frame.</summary>
+        /// <summary>Seconds since the newest frame arrived.</summary>
         public double AgeS;
 
-        /// <summary>Seconds the newest frame was on its way; means something only where server and client share a clock.</summary>
+        /// <summary>
+        /// Seconds from publication to arrival of the newest frame; meaningful only if server and client share a clock.
+        /// </summary>
         public double TransitS;
     }
 
     /// <summary>
-    /// Receives the hands of one actor (the first seen, unless named) on its own thread; reconnects by itself. All
-    /// methods may be called from any thread; none waits for the network except Dispose, which waits for the thread.
+    /// Receives the hands of one actor on its own thread and reconnects by itself. Any thread may call the methods, and
+    /// no method waits for the network except Dispose, which waits for the thread.
     /// </summary>
     public sealed class ManipNetClient : IDisposable
     {
@@ -55,8 +57,8 @@ namespace ManipNet.Client
         double _newestAt = double.NegativeInfinity;
 
         /// <param name="address">tcp://HOST:PORT</param>
-        /// <param name="actor">Whose hands; empty or null for the first seen.</param>
-        /// <param name="delayS">How far behind the newest to show, to bridge jitter and losses.</param>
+        /// <param name="actor">The actor whose hands are received; empty or null for the first one received.</param>
+        /// <param name="delayS">Seconds by which hands are shown late, to bridge jitter and lost frames.</param>
         public ManipNetClient(string address, string actor = null, double delayS = 0.1)
         {
             ParseAddress(address, out _host, out _port);
@@ -81,7 +83,7 @@ namespace ManipNet.Client
             set { lock (_lock) _interpolator.DelayS = value; }
         }
 
-        /// <summary>What to show at the time `now` of LocalClock; see Interpolator.Sample.</summary>
+        /// <summary>Computes the hands to show at the time `now` of LocalClock; see Interpolator.Sample.</summary>
         public bool Sample(double now, HandsFrame output, out float weight)
         {
             lock (_lock) return _interpolator.Sample(now, output, out weight);
@@ -110,7 +112,7 @@ namespace ManipNet.Client
             }
         }
 
-        /// <summary>Throws ArgumentException with what is allowed.</summary>
+        /// <summary>Splits an address; throws ArgumentException that says what is allowed.</summary>
         public static void ParseAddress(string address, out string host, out int port)
         {
             const string scheme = "tcp://";
@@ -118,7 +120,7 @@ namespace ManipNet.Client
             port = 0;
             bool good = address != null && address.StartsWith(scheme, StringComparison.Ordinal) && colon > scheme.Length
                 && int.TryParse(address.Substring(colon + 1), out port) && port > 0 && port < 65536;
-            if (!good) throw new ArgumentException("address is \"" + address + "\"; allowed is tcp://HOST:PORT, as in tcp://127.0.0.1:5555");
+            if (!good) throw new ArgumentException("the address is \"" + address + "\"; allowed is tcp://HOST:PORT, as in tcp://127.0.0.1:5555");
             host = address.Substring(scheme.Length, colon - scheme.Length).Trim('[', ']');
         }
 

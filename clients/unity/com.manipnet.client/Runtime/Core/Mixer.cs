@@ -2,7 +2,7 @@ using System;
 
 namespace ManipNet.Client
 {
-    /// <summary>Weighted means of frames: numbers linearly, quaternions by their normalised sum. Allocates nothing.</summary>
+    /// <summary>Computes weighted means of frames; quaternions are summed and normalised. Allocates nothing.</summary>
     public sealed class Mixer
     {
         readonly float[][] _sources;
@@ -15,7 +15,9 @@ namespace ManipNet.Client
             _weights = new double[capacity];
         }
 
-        /// <summary>Mix into `output`; names, states and the like come from the frame in the slot `reference`.</summary>
+        /// <summary>
+        /// Writes the mean to `output`; names, states and the like come from the frame in the slot `reference`.
+        /// </summary>
         public void Mix(HandsFrame[] frames, double[] weights, int reference, HandsFrame output)
         {
             output.CopyFrom(frames[reference]);
@@ -30,7 +32,7 @@ namespace ManipNet.Client
         {
             if (!output.Present) return;
             for (int k = 0; k < frames.Length; k++)
-                if (weights[k] != 0.0 && !frames[k].Hand(side).Present) return; // it comes or goes: nothing to mix with
+                if (weights[k] != 0.0 && !frames[k].Hand(side).Present) return; // it appears or disappears here, so it is not in all frames
             GatherHand(frames, weights, side, 0);
             Numbers(output.Angles);
             GatherHand(frames, weights, side, 1);
@@ -91,7 +93,9 @@ namespace ManipNet.Client
             return (float)sum;
         }
 
-        /// <summary>`output` still holds the reference, whose half of the sphere the others are brought to.</summary>
+        /// <summary>
+        /// Sums quaternions, each with the sign that is nearer to the reference, which `output` still holds.
+        /// </summary>
         void Quaternions(float[] output, int first, int stride)
         {
             for (int i = first; i < output.Length; i += stride)

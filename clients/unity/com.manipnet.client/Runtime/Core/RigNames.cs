@@ -3,12 +3,13 @@ using System.Text;
 
 namespace ManipNet.Client
 {
-    /// <summary>How common rigs name their finger bones.</summary>
+    /// <summary>The names of finger bones in common rigs.</summary>
     public static class RigNames
     {
         /// <summary>
-        /// Whether a bone's name means this finger bone: Unity and VMC (LeftIndexProximal), Mixamo (mixamorig:LeftHandIndex1),
-        /// Unreal (index_01_l), Rigify (f_index.01.L), VRoid (J_Bip_L_Index1).
+        /// Whether the name `bone` means this bone of this finger, both counted from zero. It knows the names of Unity
+        /// and VMC (LeftIndexProximal), Mixamo (mixamorig:LeftHandIndex1), Unreal (index_01_l), Rigify (f_index.01.L)
+        /// and VRoid (J_Bip_L_Index1).
         /// </summary>
         public static bool Matches(string bone, Side side, int finger, int part)
         {
@@ -20,7 +21,7 @@ namespace ManipNet.Client
             return f == "little" && Matches(name, s, l, "pinky", n);
         }
 
-        /// <summary>Whether a bone's name means the hand itself.</summary>
+        /// <summary>Whether the name `bone` means the hand itself.</summary>
         public static bool IsHand(string bone, Side side)
         {
             string name = Plain(bone), s = side == Side.Left ? "left" : "right", l = side == Side.Left ? "l" : "r";
@@ -40,7 +41,7 @@ namespace ManipNet.Client
             return name == a + b + c + d;
         }
 
-        /// <summary>Lower case, without the name space in front and without punctuation.</summary>
+        /// <summary>The name in lower case, without its namespace and punctuation.</summary>
         static string Plain(string name)
         {
             var plain = new StringBuilder();

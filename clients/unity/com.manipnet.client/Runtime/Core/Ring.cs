@@ -3,9 +3,10 @@ using System;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// The last frames on the 60 Hz grid of their capture times, and how much of each makes up an instant between them:
-    /// a uniform cubic B-spline, whose acceleration never exceeds the frames' own second differences. Lost frames are
-    /// filled from two neighbours on each side; beyond the ends it goes straight on.
+    /// The last frames on the 60 Hz grid of their capture times, and the weights of frames that show an instant between
+    /// them. The weights are those of a uniform cubic B-spline, whose acceleration never exceeds the frames' second
+    /// differences. A lost frame is replaced by the cubic through two neighbours on each side, and beyond the ends the
+    /// first or last two frames are continued in a straight line.
     /// </summary>
     public sealed class Ring
     {
@@ -27,7 +28,7 @@ namespace ManipNet.Client
             _empty = true;
         }
 
-        /// <summary>Put a frame in its place and get another one, free to be overwritten.</summary>
+        /// <summary>Stores a frame and returns another one, which may be overwritten.</summary>
         public HandsFrame Exchange(long grid, HandsFrame frame)
         {
             int slot = Slot(grid);
@@ -45,7 +46,7 @@ namespace ManipNet.Client
             return free;
         }
 
-        /// <summary>Set Weights for a position on the grid; returns the slot of the nearest frame.</summary>
+        /// <summary>Sets Weights for a position on the grid and returns the slot of the nearest frame.</summary>
         public int Weigh(double position)
         {
             Array.Clear(Weights, 0, Size);
@@ -81,12 +82,12 @@ namespace ManipNet.Client
         void Add(long index, double weight)
         {
             if (IsPresent(index)) Weights[Slot(index)] += weight;
-            else if (index > _last) GoStraightOn(_last, _last - 1, weight);
-            else if (index < _first) GoStraightOn(_first, _first + 1, weight);
+            else if (index > _last) Extrapolate(_last, _last - 1, weight);
+            else if (index < _first) Extrapolate(_first, _first + 1, weight);
             else Fill(index, weight);
         }
 
-        void GoStraightOn(long end, long inner, double weight)
+        void Extrapolate(long end, long inner, double weight)
         {
             Add(end, 2.0 * weight);
             Add(inner, -weight);

@@ -3,8 +3,8 @@ using System;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// The sender's clock, seen from here. The offset is a critically damped spring to the least "arrival minus capture
-    /// time" of about the last second, so neither jitter nor a better estimate makes a step.
+    /// Estimates the sender's clock. The offset is a critically damped spring towards the smallest difference of
+    /// arrival and capture time in about the last second, so neither jitter nor a better estimate makes a step.
     /// </summary>
     public sealed class SmoothClock
     {
@@ -42,7 +42,7 @@ namespace ManipNet.Client
             _count = _count + 1 < 2 * Window ? _count + 1 : Window;
         }
 
-        /// <summary>The sender's time at the local time `now`, which must not fall between calls.</summary>
+        /// <summary>The sender's time at the local time `now`, which must not decrease between calls.</summary>
         public double CaptureTime(double now)
         {
             double step = Math.Max(now - _now, 0.0);

@@ -7,8 +7,9 @@ using System.Text;
 namespace ManipNet.Client
 {
     /// <summary>
-    /// A ZeroMQ subscriber on a plain TCP socket: ZMTP 3, NULL mechanism, one topic. After the handshake nothing is
-    /// allocated. For one thread; Stop may be set by any and ends every wait within a twentieth of a second.
+    /// A ZeroMQ subscriber to one topic on a plain TCP socket: ZMTP 3 with the NULL mechanism. It allocates nothing
+    /// after the handshake. One thread uses it, but any may set Stop, which ends every wait within a twentieth of a
+    /// second.
     /// </summary>
     public sealed class ZmtpSubscriber
     {
@@ -22,7 +23,7 @@ namespace ManipNet.Client
         Socket _socket;
         int _start, _end, _resume;
         int _flags;
-        bool _inParts;
+        bool _insideMessage;
         double _heard, _pinged;
 
         public ZmtpSubscriber(int maxBytes)
@@ -33,16 +34,16 @@ namespace ManipNet.Client
 
         public volatile bool Stop;
 
-        /// <summary>Where the message that NextMessage found lies, until the next call.</summary>
+        /// <summary>Holds the message that NextMessage found, until the next call.</summary>
         public byte[] Buffer { get; private set; }
         public int MessageStart { get; private set; }
         public int MessageLength { get; private set; }
 
-        /// <summary>Connect and subscribe; throws IOException or SocketException with the reason.</summary>
+        /// <summary>Connects and subscribes; throws IOException or SocketException with the reason.</summary>
         public void Open(string host, int port, string topic)
         {
             _start = _end = _resume = 0;
-            _inParts = false;
+            _insideMessage = false;
             _heard = _pinged = LocalClock.Now;
             _socket = Connect(host, port);
             _socket.NoDelay = true;
@@ -50,7 +51,7 @@ namespace ManipNet.Client
             Handshake(Encoding.ASCII.GetBytes(topic));
         }
 
-        /// <summary>Without the thread pool, whose threads would stay.</summary>
+        /// <summary>Connects without the thread pool, whose threads would remain.</summary>
         Socket Connect(string host, int port)
         {
             IPAddress address;
@@ -62,14 +63,14 @@ namespace ManipNet.Client
             }
             catch (SocketException error) when (error.SocketErrorCode == SocketError.WouldBlock || error.SocketErrorCode == SocketError.InProgress)
             {
-                // under way
+                // the connection is being made
             }
             bool open = Ready(socket, ConnectMs, SelectMode.SelectWrite);
             int result = (int)socket.GetSocketOption(SocketOptionLevel.Socket, SocketOptionName.Error);
             if (!open || result != 0)
             {
                 socket.Close();
-                throw new IOException("nobody answers at " + host + ":" + port);
+                throw new IOException("no server answers at " + host + ":" + port);
             }
             socket.Blocking = true;
             return socket;
@@ -82,8 +83,8 @@ namespace ManipNet.Client
         }
 
         /// <summary>
-        /// Find the next whole message, waiting at most a quarter second for it. False when there is none yet. Throws
-        /// when the connection is lost or the other side is silent even to a ping.
+        /// Finds the next complete message and waits at most a quarter of a second for it. Returns false if none has
+        /// arrived. Throws when the connection is lost or when the other side does not even answer a ping.
         /// </summary>
         public bool NextMessage()
         {
@@ -95,9 +96,9 @@ namespace ManipNet.Client
                     Answer();
                     continue;
                 }
-                bool whole = (flags & More) == 0 && !_inParts; // ours have one part; longer ones are left out
-                _inParts = (flags & More) != 0;
-                if (whole) return true;
+                bool complete = (flags & More) == 0 && !_insideMessage; // all of ours have one frame; longer messages are skipped
+                _insideMessage = (flags & More) != 0;
+                if (complete) return true;
             }
             Receive(WaitMs);
             return false;
@@ -113,7 +114,7 @@ namespace ManipNet.Client
             if (available < head) return false;
             long size = 0;
             for (int i = 1; i < head; i++) size = size << 8 | Buffer[_start + i];
-            if (size < 0 || size > _maxBytes) throw new IOException("a frame of " + size + " bytes; at most " + _maxBytes + " are allowed");
+            if (size < 0 || size > _maxBytes) throw new IOException("the server sent a frame of " + size + " bytes; at most " + _maxBytes + " are allowed");
             if (available < head + size) return false;
             MessageStart = _start + head;
             MessageLength = (int)size;
@@ -140,7 +141,7 @@ namespace ManipNet.Client
             _heard = LocalClock.Now;
         }
 
-        /// <summary>By the clock: on a busy machine a slice takes longer than it should.</summary>
+        /// <summary>Waits by the clock, because a slice takes longer on a busy machine.</summary>
         bool Ready(Socket socket, int waitMs, SelectMode mode)
         {
             double until = LocalClock.Now + 0.001 * waitMs;
@@ -155,7 +156,7 @@ namespace ManipNet.Client
         void CheckAlive()
         {
             double now = LocalClock.Now;
-            if (now - _heard > DeadAfterS) throw new IOException("nothing heard for " + DeadAfterS + " s");
+            if (now - _heard > DeadAfterS) throw new IOException("nothing has arrived for " + DeadAfterS + " s");
             if (now - _heard < PingAfterS || now - _pinged < PingAfterS) return;
             _pinged = now;
             _socket.Send(Ping, 0, Ping.Length, SocketFlags.None);
@@ -181,11 +182,13 @@ namespace ManipNet.Client
             greeting[10] = 3;
             greeting[11] = 1;
             Encoding.ASCII.GetBytes("NULL", 0, 4, greeting, 12);
-            _socket.Send(greeting, 0, SignatureBytes, SocketFlags.None); // all at once, and some hang up unexplained
+            // Some servers that dislike the rest of the greeting close the connection without a reason, so it is sent later.
+            _socket.Send(greeting, 0, SignatureBytes, SocketFlags.None);
             while (_end < 64) ReceiveGreeting();
             if (Buffer[0] != 0xFF || (Buffer[9] & 1) == 0 || Buffer[10] < 3) throw new IOException("the other side does not speak ZMTP 3");
             string mechanism = Encoding.ASCII.GetString(Buffer, 12, 20).TrimEnd('\0');
-            if (mechanism != "NULL") throw new IOException("the server asks for " + mechanism + "; this client speaks NULL only: use a tunnel");
+            if (mechanism != "NULL")
+                throw new IOException("the server requires " + mechanism + ", which this client does not support; use a tunnel");
             bool byCommand = Buffer[11] >= 1;
             _resume = 64;
             _socket.Send(greeting, SignatureBytes, 64 - SignatureBytes, SocketFlags.None);
@@ -203,7 +206,7 @@ namespace ManipNet.Client
         {
             int before = _end;
             Receive(ConnectMs);
-            if (_end == before) throw new IOException("the other side does not speak ZMTP 3: it keeps silent");
+            if (_end == before) throw new IOException("the other side does not speak ZMTP 3: it sends nothing");
         }
 
         void Send(int flags, byte[] body)

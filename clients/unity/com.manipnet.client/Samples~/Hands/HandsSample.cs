@@ -2,7 +2,8 @@ using ManipNet.Client.Unity;
 using UnityEngine;
 
 /// <summary>
-/// Put this on an empty object and press play while `manipnet-serve --demo` runs: spheres on every joint of both hands.
+/// Shows a sphere at every joint of both hands. Add this to an empty object and press play while `manipnet-serve
+/// --demo` runs.
 /// </summary>
 public sealed class HandsSample : MonoBehaviour
 {

@@ -5,14 +5,14 @@ namespace ManipNet.Client.Tests
     public sealed class DecoderTests
     {
         [Test]
-        public void RefusesWhatIsNoMessage()
+        public void RefusesOtherData()
         {
             string error = HandsDecoder.Decode(new byte[300], 0, 300, new HandsFrame());
             StringAssert.Contains("MNPL", error);
         }
 
         [Test]
-        public void RefusesAnotherVersionNamingBoth()
+        public void NamesBothVersionsWhenItRefusesOne()
         {
             var message = new byte[Layout.HeaderBytes];
             System.BitConverter.GetBytes(Layout.Magic).CopyTo(message, 0);

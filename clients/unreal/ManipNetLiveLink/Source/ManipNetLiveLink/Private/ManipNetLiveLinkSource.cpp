@@ -56,7 +56,7 @@ void FManipNetLiveLinkSource::ReceiveClient(ILiveLinkClient* InClient, FGuid InS
 void FManipNetLiveLinkSource::Update()
 {
     float Weight = 0.0f;
-    // Once faded, push nothing: Live Link then shows the subject as stale.
+    // After the fade nothing is pushed, so that Live Link shows the subject as stale.
     if (!Client || !Client->Sample(manipnet::LocalNow(), Frame, Weight) || Weight <= 0.0f)
     {
         return;

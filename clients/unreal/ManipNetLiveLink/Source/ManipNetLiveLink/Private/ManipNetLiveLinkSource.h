@@ -7,8 +7,8 @@
 #include "Core/Client.h"
 #include "ILiveLinkSource.h"
 
-/// A server's hands as animation subjects and its tracked bodies as transform subjects. The network is read on a thread
-/// of the client; Live Link gets one frame per engine tick, interpolated for that instant.
+/// Shows a server's hands as animation subjects and its tracked bodies as transform subjects. The client reads the
+/// network on its own thread; Live Link gets one frame per engine tick, interpolated for that instant.
 class FManipNetLiveLinkSource final : public ILiveLinkSource
 {
 public:

@@ -5,7 +5,7 @@
 
 #include "ManipNetLiveLinkSourceFactory.generated.h"
 
-/// Offers ManipNet in Live Link's "Add Source" menu. The connection string is all a preset keeps, and all it needs.
+/// Offers ManipNet in Live Link's "Add Source" menu. A preset stores only the connection string, which is sufficient.
 UCLASS()
 class MANIPNETLIVELINK_API UManipNetLiveLinkSourceFactory : public ULiveLinkSourceFactory
 {

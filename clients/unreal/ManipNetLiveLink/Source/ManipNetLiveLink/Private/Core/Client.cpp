@@ -69,7 +69,7 @@ void Client::Run() {
     SetState("closed");
 }
 
-/// Until the connection breaks; returns why it did.
+/// Reads until the connection breaks, and returns the reason.
 std::string Client::Read() {
     const std::string error = Subscriber.Open(To.Host, To.Port, layout::kTopic);
     if (!error.empty()) return error;

@@ -15,22 +15,23 @@
 
 namespace manipnet {
 
-/// What a status line shows.
+/// The state and the counters of a client.
 struct Stats {
     std::string State = "connecting";
-    std::int64_t Received = 0;  ///< Frames that arrived; Late ones of these came too late to be shown.
+    std::int64_t Received = 0;  ///< Readable frames; Late are those of them that came too late to be shown.
     std::int64_t Late = 0;
     std::int64_t Lost = 0;     ///< Frames that never arrived.
     std::int64_t Refused = 0;  ///< Messages that could not be read.
     int Connections = 0;
-    std::uint64_t Seq = 0;  ///< Number of the newest frame, as the server counts them.
+    std::uint64_t Seq = 0;  ///< The server's number of the newest frame.
     double RateHz = 0.0;
-    double AgeS = -1.0;     ///< Seconds since the newest frame; negative before the first.
-    double TransitS = 0.0;  ///< Seconds it was on its way; means something only where server and client share a clock.
+    double AgeS = -1.0;     ///< Seconds since the newest frame arrived; negative before the first.
+    double TransitS = 0.0;  ///< Seconds from its publication to its arrival, if server and client share a clock.
 };
 
-/// Receives the hands of one actor (the first seen, unless named) on its own thread; reconnects by itself. All methods
-/// may be called from any thread; none waits for the network except the destructor, which waits for the thread.
+/// Receives the hands of one actor (the first one received, if none is named) on its own thread and reconnects by
+/// itself. Any thread may call the methods, and none waits for the network except the destructor, which waits for the
+/// thread.
 class Client {
 public:
     explicit Client(const Connection& to);
@@ -38,7 +39,7 @@ public:
     Client(const Client&) = delete;
     Client& operator=(const Client&) = delete;
 
-    /// What to show at the time `now` of LocalNow; see Interpolator::Sample.
+    /// Computes the hands to show at the time `now` of LocalNow; see Interpolator::Sample.
     bool Sample(double now, HandsFrame& output, float& weight);
     Stats GetStats() const;
 

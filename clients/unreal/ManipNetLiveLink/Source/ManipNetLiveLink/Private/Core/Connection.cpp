@@ -17,7 +17,7 @@ std::string ParseAddress(const std::string& address, Connection& connection) {
         number = std::min(10 * number + static_cast<unsigned>(address[i] - '0'), 65536U);
     }
     if (!good || number == 0 || number > 65535)
-        return "address is \"" + address + "\"; allowed is tcp://HOST:PORT, as in " + Connection::kDefault;
+        return "the address is \"" + address + "\"; allowed is tcp://HOST:PORT, as in " + Connection::kDefault;
     connection.Host = address.substr(kScheme.size(), colon - kScheme.size());
     if (connection.Host.size() > 2 && connection.Host.front() == '[' && connection.Host.back() == ']')
         connection.Host = connection.Host.substr(1, connection.Host.size() - 2);
@@ -29,7 +29,7 @@ std::string ParseDelay(const std::string& value, Connection& connection) {
     char* end = nullptr;
     const double delay = std::strtod(value.c_str(), &end);
     if (value.empty() || *end != '\0' || !(delay >= 0.0 && delay <= Connection::kMaxDelayS))
-        return "delay is \"" + value + "\"; allowed are 0 to 1 seconds";
+        return "the delay is \"" + value + "\"; allowed are 0 to 1 seconds";
     connection.DelayS = delay;
     return {};
 }

@@ -6,12 +6,12 @@
 namespace manipnet {
 namespace {
 
-static_assert(layout::kVersion == 1, "this reader is written for version 1");
+static_assert(layout::kVersion == 1, "this decoder is written for version 1");
 
 template <typename T>
 T Read(const std::uint8_t* at) {
     T value;
-    std::memcpy(&value, at, sizeof value);  // every supported machine is little-endian, as the message is
+    std::memcpy(&value, at, sizeof value);  // all supported machines are little-endian, as the message is
     return value;
 }
 
@@ -23,7 +23,7 @@ bool ReadFloats(const std::uint8_t* at, std::array<float, N>& into) {
     return finite;
 }
 
-/// Length of the UTF-8 character at `text`, 0 if malformed (overlong, surrogate or cut off).
+/// The length of the UTF-8 character at `text`, or 0 if it is malformed (overlong, a surrogate or cut off).
 std::size_t CharacterLength(const std::uint8_t* text, std::size_t left) {
     const std::uint8_t lead = text[0];
     if (lead < 0x80) return 1;
@@ -59,7 +59,7 @@ std::string ReadHeader(const std::uint8_t* at, HandsFrame& frame) {
     const bool finite =
         std::isfinite(frame.TCapture) && std::isfinite(frame.TPublish) && std::isfinite(frame.LookAhead);
     if (!ReadFloats(at + layout::kHeaderLatencyMs, frame.LatencyMs) || !finite)
-        return "the header holds a number that is not finite";
+        return "the header has a number that is not finite";
     if (!ReadName(at + layout::kHeaderSession, frame.Session) || !ReadName(at + layout::kHeaderActor, frame.Actor))
         return "the name of the session or the actor is too long or not UTF-8";
     return {};
@@ -68,10 +68,10 @@ std::string ReadHeader(const std::uint8_t* at, HandsFrame& frame) {
 std::string ReadHand(const std::uint8_t* at, HandsFrame& frame) {
     const unsigned side = at[layout::kHandSide];
     const unsigned state = at[layout::kHandState];
-    if (side > 1) return "side is " + std::to_string(side) + "; allowed are 0 (left) and 1 (right)";
-    if (state > 2) return "state is " + std::to_string(state) + "; allowed are 0 (live), 1 (hold) and 2 (rest)";
+    if (side > 1) return "the side is " + std::to_string(side) + "; allowed are 0 (left) and 1 (right)";
+    if (state > 2) return "the state is " + std::to_string(state) + "; allowed are 0 (live), 1 (hold) and 2 (rest)";
     HandFrame& hand = frame.Hands[side];
-    if (hand.Present) return "the same hand occurs twice; once is allowed";
+    if (hand.Present) return "the same hand occurs twice; it may occur once";
     hand.Present = true;
     hand.State = static_cast<std::uint8_t>(state);
     hand.HasObject = at[layout::kHandHasObject] != 0;
@@ -82,24 +82,24 @@ std::string ReadHand(const std::uint8_t* at, HandsFrame& frame) {
     const bool wrist = ReadFloats(at + layout::kHandWrist, hand.Wrist);
     const bool joints = ReadFloats(at + layout::kHandJoints, hand.Joints);
     if (!(angles && rotations && wrist && joints && std::isfinite(hand.Scale)))
-        return "a hand holds a number that is not finite";
+        return "a hand has a number that is not finite";
     return {};
 }
 
 std::string ReadBody(const std::uint8_t* at, BodyFrame& body) {
     body.Tracked = at[layout::kBodyTracked] != 0;
     if (!ReadName(at + layout::kBodyName, body.BodyName)) return "a body's name is too long or not UTF-8";
-    return ReadFloats(at + layout::kBodyPose, body.Pose) ? std::string() : "a body holds a number that is not finite";
+    return ReadFloats(at + layout::kBodyPose, body.Pose) ? std::string() : "a body has a number that is not finite";
 }
 
 }  // namespace
 
 std::string Decode(const std::uint8_t* data, std::size_t length, HandsFrame& frame) {
     if (length < layout::kHeaderBytes || Read<std::uint32_t>(data) != layout::kMagic)
-        return "not a pose/bin message: it must start with MNPL and a whole header";
+        return "the message is not pose/bin; it must begin with MNPL and a complete header";
     const unsigned version = Read<std::uint16_t>(data + layout::kHeaderVersion);
     if (version != layout::kVersion)
-        return "message is of version " + std::to_string(version) + "; this reader understands version " +
+        return "the message has version " + std::to_string(version) + "; this client understands version " +
                std::to_string(layout::kVersion);
     const std::size_t headerSize = Read<std::uint16_t>(data + layout::kHeaderHeaderSize);
     const std::size_t handSize = Read<std::uint16_t>(data + layout::kHeaderHandSize);
@@ -109,11 +109,12 @@ std::string Decode(const std::uint8_t* data, std::size_t length, HandsFrame& fra
     if (headerSize < layout::kHeaderBytes || handSize < layout::kHandBytes || bodySize < layout::kBodyBytes)
         return "a record is shorter than its fields";
     if (hands > 2 || bodies > layout::kMaxBodies)
-        return std::to_string(hands) + " hands and " + std::to_string(bodies) + " bodies; 2 and " +
+        return "the message has " + std::to_string(hands) + " hands and " + std::to_string(bodies) +
+               " bodies; at most 2 and " +
                std::to_string(layout::kMaxBodies) + " are allowed";
     const std::size_t total = headerSize + hands * handSize + bodies * bodySize;
     if (length != total || Read<std::uint32_t>(data + layout::kHeaderTotalSize) != total)
-        return "message has " + std::to_string(length) + " bytes; its header promises " + std::to_string(total);
+        return "the message has " + std::to_string(length) + " bytes, but its header says " + std::to_string(total);
 
     std::string error = ReadHeader(data, frame);
     const std::uint8_t* at = data + headerSize;

@@ -8,8 +8,8 @@
 
 namespace manipnet {
 
-/// Reads the payload of `pose/bin`, see docs/protocol.md. Empty when it was read, else what was wrong, and the frame is
-/// in an undefined state. Allocates only to explain a refusal.
+/// Decodes the payload of `pose/bin`, which docs/protocol.md describes. Fills the frame and returns an empty string, or
+/// returns what is wrong and leaves the frame in an undefined state. Allocates only to explain a refusal.
 std::string Decode(const std::uint8_t* data, std::size_t length, HandsFrame& frame);
 
 }  // namespace manipnet

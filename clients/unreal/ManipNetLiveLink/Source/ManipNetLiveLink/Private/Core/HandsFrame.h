@@ -1,4 +1,4 @@
-// One message in memory that is used again and again. Right-handed, Y up, metres, radians, quaternions xyzw.
+// One message, in memory that is reused. Axes are right-handed with Y up; metres, radians, quaternions xyzw.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace manipnet {
 
 enum class Side { Left = 0, Right = 1 };
 
-/// A short UTF-8 text, always terminated.
+/// A short UTF-8 text with a terminating zero.
 struct Name {
     std::uint8_t Length = 0;
     char Text[layout::kNameBytes + 1] = {};
@@ -27,12 +27,12 @@ struct Name {
 struct HandFrame {
     bool Present = false;
     bool HasObject = false;
-    std::uint8_t State = 0;  ///< Index into layout::kStates.
+    std::uint8_t State = 0;  ///< An index of layout::kStates.
     Name Object;
     float Scale = 1.0F;
     std::array<float, layout::kAngleCount> Angles{};
-    std::array<float, 4 * layout::kBoneCount> Rotations{};  ///< Local to the parent bone.
-    std::array<float, 7> Wrist{};                           ///< In the world: position, quaternion.
+    std::array<float, 4 * layout::kBoneCount> Rotations{};  ///< Relative to the parent bone.
+    std::array<float, 7> Wrist{};                           ///< Position and quaternion in the world.
     std::array<float, 7 * layout::kJointCount> Joints{};    ///< OpenXR joints in the world.
 };
 
@@ -50,8 +50,8 @@ struct HandsFrame {
     double TPublish = 0.0;
     double LookAhead = 0.0;
     std::array<float, 5> LatencyMs{};
-    std::array<HandFrame, 2> Hands;  ///< By Side.
-    std::size_t BodyCount = 0;       ///< Of Bodies, which never shrinks so that nothing is allocated per frame.
+    std::array<HandFrame, 2> Hands;  ///< Indexed by Side.
+    std::size_t BodyCount = 0;       ///< Used part of Bodies, which never shrinks, so that frames allocate nothing.
     std::vector<BodyFrame> Bodies;
 
     const HandFrame& Hand(Side side) const { return Hands[static_cast<std::size_t>(side)]; }
@@ -61,7 +61,7 @@ struct HandsFrame {
         BodyCount = count;
     }
 
-    /// As assignment, but keeps the room for bodies it has.
+    /// Copies like an assignment, but keeps the memory for bodies.
     void CopyFrom(const HandsFrame& other) {
         Session = other.Session;
         Actor = other.Actor;

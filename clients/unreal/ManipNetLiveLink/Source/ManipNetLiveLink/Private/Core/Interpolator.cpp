@@ -42,7 +42,7 @@ bool Interpolator::Sample(double now, HandsFrame& output, float& weight) {
     Parts parts;
     for (std::size_t i = 0; i < Recent.Frames.size(); ++i) parts.Add(*Recent.Frames[i], Recent.Weights[i]);
     Mix(parts, *Recent.Frames[nearest], output);
-    Held.Bodies.reserve(output.BodyCount);  // so that the first gap allocates nothing either
+    Held.Bodies.reserve(output.BodyCount);  // the first gap must not allocate
     Target.Bodies.reserve(output.BodyCount);
     const double starved = (position - static_cast<double>(GridOf(Capture))) / kRateHz;
     Ease(output, starved, now);
@@ -68,7 +68,7 @@ bool Interpolator::Accept(const HandsFrame& frame, double arrival) {
     return true;
 }
 
-/// Another session, or the sender's clock set back, as when a take loops.
+/// Begins anew, for a new session or after the sender's clock went back, as when a take loops.
 void Interpolator::Restart(const HandsFrame& frame) {
     Recent.Clear();
     Clock.Reset();
@@ -77,7 +77,7 @@ void Interpolator::Restart(const HandsFrame& frame) {
     Starved = HasShown;
 }
 
-/// Backlog after a stall; but if everything is late for long, it is the clock that has changed.
+/// Whether the frame is backlog after a stall; if frames stay late for long, the clock has changed instead.
 bool Interpolator::IsStale(const HandsFrame& frame, double arrival) {
     if (arrival - frame.TCapture - Clock.Target() <= kStaleS) {
         StaleSince = std::numeric_limits<double>::quiet_NaN();
@@ -89,7 +89,7 @@ bool Interpolator::IsStale(const HandsFrame& frame, double arrival) {
     return false;
 }
 
-/// After a gap, glide from the pose that was held to the stream.
+/// Blends with the held pose for a short time after a gap.
 void Interpolator::Ease(HandsFrame& output, double starved, double now) {
     if (starved > 1.0 / kRateHz) {
         Starved = true;

@@ -11,18 +11,19 @@
 
 namespace manipnet {
 
-/// Shows hands smoothly at any display rate: by capture time, a chosen delay behind, held then faded on loss.
+/// Interpolates hands by capture time, a chosen delay behind, for any display rate; holds and then fades them on loss.
 /// Not thread-safe. Allocates nothing after construction.
 class Interpolator {
 public:
     double DelayS = 0.1;
-    std::int64_t Late = 0;  ///< Frames that came too late to be of use.
+    std::int64_t Late = 0;  ///< The number of frames that came too late to be shown.
 
-    /// Hand over a frame that arrived at the local time `arrival`, and get one to fill next. False when it came too late.
+    /// Takes a frame that arrived at the local time `arrival` and gives one to fill next. Returns false if it is too
+    /// late.
     bool Push(std::unique_ptr<HandsFrame>& frame, double arrival);
 
-    /// What to show at the local time `now`, which must not fall. False before the first frame. `weight` falls from 1 to
-    /// 0 when the stream is lost: mix your own animation in by it.
+    /// Computes the hands to show at the local time `now`, which must not decrease. Returns false before the first
+    /// frame. `weight` falls from 1 to 0 when the stream is lost; use it to blend to another animation.
     bool Sample(double now, HandsFrame& output, float& weight);
 
 private:

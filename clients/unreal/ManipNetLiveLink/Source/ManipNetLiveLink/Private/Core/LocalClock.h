@@ -4,7 +4,7 @@
 
 namespace manipnet {
 
-/// Seconds of a clock that never goes back.
+/// The time in seconds of a clock that never goes back.
 inline double LocalNow() {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }

@@ -5,7 +5,7 @@
 namespace manipnet {
 namespace {
 
-/// `get(frame)` is the array of a field in a frame; `output` holds the reference's values.
+/// `get(frame)` returns the array of a field of a frame; `output` holds the values of the reference.
 template <typename Array, typename Get>
 void MixNumbers(const Parts& parts, Get get, Array& output, std::size_t first, std::size_t stride, std::size_t width) {
     for (std::size_t i = first; i < output.size(); i += stride) {
@@ -43,7 +43,7 @@ void MixPoses(const Parts& parts, Get get, Array& output) {
 void MixHand(const Parts& parts, std::size_t side, HandFrame& output) {
     if (!output.Present) return;
     for (const Part& part : parts)
-        if (!part.Frame->Hands[side].Present) return;  // it comes or goes: nothing to mix with
+        if (!part.Frame->Hands[side].Present) return;  // it appears or disappears, so it is not in all
     using Frame = const HandsFrame&;
     MixNumbers(parts, [side](Frame f) -> auto& { return f.Hands[side].Angles; }, output.Angles, 0, 1, 1);
     MixQuaternions(parts, [side](Frame f) -> auto& { return f.Hands[side].Rotations; }, output.Rotations, 0, 4);

@@ -7,13 +7,13 @@
 
 namespace manipnet {
 
-/// A frame and how much of it to take.
+/// A frame and its weight.
 struct Part {
     const HandsFrame* Frame = nullptr;
     double Weight = 0.0;
 };
 
-/// The parts of a mixture: at most a ring full.
+/// The weighted frames of a mean, at most as many as a ring holds.
 struct Parts {
     std::array<Part, Ring::kSize> Items{};
     std::size_t Count = 0;
@@ -25,7 +25,7 @@ struct Parts {
     const Part* end() const { return Items.data() + Count; }
 };
 
-/// Weighted mean of frames: numbers linearly, quaternions by their normalised sum. Names, states and the like come from
+/// Computes the weighted mean of frames; quaternions are summed and normalised. Names, states and the like come from
 /// `reference`. Allocates nothing.
 void Mix(const Parts& parts, const HandsFrame& reference, HandsFrame& output);
 

@@ -66,7 +66,7 @@ void Ring::Add(std::int64_t index, double weight) {
     }
 }
 
-/// The polynomial through up to two frames on each side of a lost one.
+/// Adds a lost frame by the polynomial through up to two frames on each side of it.
 void Ring::Fill(std::int64_t index, double weight) {
     const std::size_t count = Collect(index, 1, Collect(index, -1, 0));
     for (std::size_t i = 0; i < count; ++i) {

@@ -9,9 +9,10 @@
 
 namespace manipnet {
 
-/// The last frames on the 60 Hz grid of their capture times, and how much of each makes up an instant between them: a
-/// uniform cubic B-spline, whose acceleration never exceeds the frames' own second differences. Lost frames are filled
-/// from two neighbours on each side; beyond the ends it goes straight on.
+/// The last frames on the 60 Hz grid of their capture times, and the weights of frames that show an instant between
+/// them. The weights are those of a uniform cubic B-spline, whose acceleration never exceeds the frames' second
+/// differences. A lost frame is replaced by the cubic through two neighbours on each side, and beyond the ends the
+/// first or last two frames are continued in a straight line.
 class Ring {
 public:
     static constexpr std::int64_t kSize = 32;
@@ -20,10 +21,10 @@ public:
     Ring();
     void Clear() { Empty = true; }
 
-    /// Put a frame in its place and get another one, free to be overwritten.
+    /// Stores a frame and returns another one, which may be overwritten.
     void Exchange(std::int64_t grid, std::unique_ptr<HandsFrame>& frame);
 
-    /// Set Weights for a position on the grid; returns the slot of the nearest frame.
+    /// Sets Weights for a position on the grid and returns the slot of the nearest frame.
     std::size_t Weigh(double position);
 
     Slots Frames;

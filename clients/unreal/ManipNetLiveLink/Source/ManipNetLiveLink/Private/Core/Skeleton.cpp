@@ -3,7 +3,7 @@
 namespace manipnet {
 namespace {
 
-/// Live Link wants parents before children, OpenXR has the palm before the wrist.
+/// The order of joints, because Live Link needs parents before children and OpenXR has the palm before the wrist.
 std::size_t JointOf(std::size_t bone) { return bone < 2 ? 1 - bone : bone; }
 
 struct Vec {

@@ -8,7 +8,7 @@
 
 namespace manipnet {
 
-/// A hand as a skeleton: the OpenXR joints, each relative to its parent, the wrist first and in the world.
+/// A hand as a skeleton of OpenXR joints, each relative to its parent. The wrist comes first and is in the world.
 struct Skeleton {
     static constexpr std::size_t kBones = layout::kJointCount;
     using Poses = std::array<UnrealPose, kBones>;

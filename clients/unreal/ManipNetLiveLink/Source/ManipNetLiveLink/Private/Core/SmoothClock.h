@@ -8,8 +8,8 @@
 
 namespace manipnet {
 
-/// The sender's clock, seen from here. The offset is a critically damped spring to the least "arrival minus capture
-/// time" of about the last second, so neither jitter nor a better estimate makes a step.
+/// Estimates the sender's clock. The offset is a critically damped spring towards the smallest difference of arrival
+/// and capture time in about the last second, so neither jitter nor a better estimate makes a step.
 class SmoothClock {
 public:
     void Reset() { Count = 0; }
@@ -30,7 +30,7 @@ public:
         ++Count;
     }
 
-    /// The sender's time at the local time `now`, which must not fall between calls.
+    /// The sender's time at the local time `now`, which must not decrease between calls.
     double CaptureTime(double now) {
         const double step = std::max(now - Last, 0.0);
         Last = std::max(now, Last);

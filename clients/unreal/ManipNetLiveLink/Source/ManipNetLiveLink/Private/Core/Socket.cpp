@@ -29,7 +29,7 @@
 namespace manipnet {
 namespace {
 
-constexpr int kSliceMs = 50;  // how soon a wait notices that it should end
+constexpr int kSliceMs = 50;  // how often a wait checks whether it should end
 
 #ifdef _WIN32
 using Native = SOCKET;
@@ -65,8 +65,9 @@ std::string Socket::Connect(const std::string& host, std::uint16_t port, int tim
     addrinfo hints{};
     hints.ai_socktype = SOCK_STREAM;
     addrinfo* found = nullptr;
-    if (getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found) != 0) return "no such host: " + host;
-    std::string error = "no address for " + host;
+    const int result = getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &found);
+    if (result != 0) return "the host " + host + " is unknown";
+    std::string error = "the host " + host + " has no address";
     for (const addrinfo* a = found; a != nullptr && !error.empty(); a = a->ai_next) {
         Handle = static_cast<std::intptr_t>(socket(a->ai_family, a->ai_socktype, a->ai_protocol));
         if (Handle < 0) continue;
@@ -81,7 +82,7 @@ std::string Socket::Connect(const std::string& host, std::uint16_t port, int tim
         } else {
             failed = 1;
         }
-        error = failed == 0 ? std::string() : "nobody answers at " + host + ":" + std::to_string(port);
+        error = failed == 0 ? std::string() : "no server answers at " + host + ":" + std::to_string(port);
         if (failed != 0) Close();
     }
     freeaddrinfo(found);
@@ -124,7 +125,7 @@ long Socket::Receive(std::uint8_t* data, std::size_t capacity, int timeoutMs) {
 }
 
 bool Socket::Wait(bool toWrite, int timeoutMs) const {
-    const double until = LocalNow() + 0.001 * timeoutMs;  // by the clock: on a busy machine a slice takes longer
+    const double until = LocalNow() + 0.001 * timeoutMs;  // a slice takes longer on a busy machine
     while (!Stop) {
         PollItem one{};
         one.fd = static_cast<Native>(Handle);

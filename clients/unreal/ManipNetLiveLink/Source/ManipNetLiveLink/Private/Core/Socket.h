@@ -7,8 +7,8 @@
 
 namespace manipnet {
 
-/// A TCP connection whose every wait is short and ends when `stop` is set. Functions that can fail return what went
-/// wrong, or an empty text.
+/// A TCP connection whose waits are short and end when `stop` is set. Functions that can fail return an empty string or
+/// the reason.
 class Socket {
 public:
     explicit Socket(const std::atomic<bool>& stop) : Stop(stop) {}
@@ -20,7 +20,7 @@ public:
     void Close();
     std::string Send(const std::uint8_t* data, std::size_t length);
 
-    /// Bytes read into `data`; 0 when nothing came in time; -1 when the connection is lost.
+    /// Returns the number of bytes read into `data`, 0 if none came in time, -1 if the connection is lost.
     long Receive(std::uint8_t* data, std::size_t capacity, int timeoutMs);
 
 private:

@@ -27,7 +27,7 @@ ZmtpSubscriber::ZmtpSubscriber(std::size_t maxBytes, const std::atomic<bool>& st
 
 std::string ZmtpSubscriber::Open(const std::string& host, std::uint16_t port, const std::string& topic) {
     Start = End = Resume = MessageSize = 0;
-    InParts = false;
+    InsideMessage = false;
     Failure.clear();
     Heard = Pinged = LocalNow();
     std::string error = Connection.Connect(host, port, kHandshakeMs);
@@ -42,9 +42,9 @@ ZmtpSubscriber::Next ZmtpSubscriber::NextMessage() {
             if (!Answer()) return Next::Broken;
             continue;
         }
-        const bool whole = (Flags & kMore) == 0 && !InParts;  // ours have one part; longer ones are left out
-        InParts = (Flags & kMore) != 0;
-        if (whole) return Next::Message;
+        const bool complete = (Flags & kMore) == 0 && !InsideMessage;  // longer messages than ours are skipped
+        InsideMessage = (Flags & kMore) != 0;
+        if (complete) return Next::Message;
     }
     return Failure.empty() && Receive(kWaitMs) ? Next::Nothing : Next::Broken;
 }
@@ -55,13 +55,16 @@ std::string ZmtpSubscriber::Handshake(const std::string& topic) {
     greeting[10] = 3;
     greeting[11] = 1;
     std::memcpy(greeting + kMechanism, "NULL", 4);
-    std::string error = Connection.Send(greeting, kSignatureBytes);  // all at once, and some hang up unexplained
+    // Some servers that dislike the rest of the greeting close the connection without a reason, so it is sent later.
+    std::string error = Connection.Send(greeting, kSignatureBytes);
     if (!error.empty()) return error;
     if (!FillUntil(kGreetingBytes)) return Failure;
     if (Buffer[0] != 0xFF || (Buffer[9] & 1) == 0 || Buffer[10] < 3) return "the other side does not speak ZMTP 3";
     const auto* name = reinterpret_cast<const char*>(Buffer.data() + kMechanism);
     const std::string mechanism(name, std::find(name, name + kMechanismBytes, '\0'));
-    if (mechanism != "NULL") return "the server asks for " + mechanism + "; this client speaks NULL only: use a tunnel";
+    if (mechanism != "NULL") {
+        return "the server requires " + mechanism + ", which this client does not support; use a tunnel";
+    }
     const bool byCommand = Buffer[11] >= 1;
     Resume = kGreetingBytes;
     error = Connection.Send(greeting + kSignatureBytes, kGreetingBytes - kSignatureBytes);
@@ -75,11 +78,11 @@ std::string ZmtpSubscriber::Handshake(const std::string& topic) {
     return Send(byCommand ? kCommand : 0, subscribe.data(), subscribe.size()) ? std::string() : Failure;
 }
 
-/// Wait until so many bytes lie in the buffer.
+/// Waits until the buffer has so many bytes.
 bool ZmtpSubscriber::FillUntil(std::size_t count) {
     const double giveUp = LocalNow() + kHandshakeMs / 1000.0;
     while (End - Start < count) {
-        if (LocalNow() > giveUp) return Fail("the other side does not speak ZMTP 3: it keeps silent");
+        if (LocalNow() > giveUp) return Fail("the other side does not speak ZMTP 3: it sends nothing");
         if (!Receive(kWaitMs)) return false;
     }
     return true;
@@ -95,7 +98,7 @@ bool ZmtpSubscriber::NextFrame() {
     std::uint64_t size = 0;
     for (std::size_t i = 1; i < head; ++i) size = size << 8 | Buffer[Start + i];
     if (size > MaxBytes) {
-        Fail("a frame is longer than any message may be");
+        Fail("the server sent a frame that is longer than any message may be");
         return false;
     }
     if (available < head + size) return false;
@@ -121,7 +124,7 @@ bool ZmtpSubscriber::Receive(int timeoutMs) {
 
 bool ZmtpSubscriber::CheckAlive() {
     const double now = LocalNow();
-    if (now - Heard > kDeadAfterS) return Fail("nothing heard for 3 s");
+    if (now - Heard > kDeadAfterS) return Fail("nothing has arrived for 3 s");
     if (now - Heard < kPingAfterS || now - Pinged < kPingAfterS) return true;
     Pinged = now;
     return Send(kCommand, "\x04PING\0\0", 7);

@@ -10,23 +10,23 @@
 
 namespace manipnet {
 
-/// A ZeroMQ subscriber on a plain TCP socket: ZMTP 3, NULL mechanism, one topic. After Open nothing is allocated unless
-/// the connection breaks. For one thread.
+/// A ZeroMQ subscriber to one topic on a plain TCP socket: ZMTP 3 with the NULL mechanism. It allocates nothing after
+/// Open unless the connection breaks. Only one thread may use it.
 class ZmtpSubscriber {
 public:
     enum class Next { Message, Nothing, Broken };
 
     ZmtpSubscriber(std::size_t maxBytes, const std::atomic<bool>& stop);
 
-    /// Connect and subscribe; returns what went wrong, or an empty text.
+    /// Connects and subscribes; returns an empty string or the reason why it failed.
     std::string Open(const std::string& host, std::uint16_t port, const std::string& topic);
     void Close() { Connection.Close(); }
 
-    /// Find the next whole message, waiting a quarter second for it. Broken: the connection is lost, or the other side is
-    /// silent even to a ping, see Error.
+    /// Finds the next complete message and waits a quarter of a second for it. Returns Broken if the connection is lost
+    /// or the other side does not even answer a ping; Error then gives the reason.
     Next NextMessage();
 
-    /// The message NextMessage found, until the next call.
+    /// The message that NextMessage found, valid until the next call.
     const std::uint8_t* Message() const { return Buffer.data() + MessageStart; }
     std::size_t MessageLength() const { return MessageSize; }
     const std::string& Error() const { return Failure; }
@@ -52,7 +52,7 @@ private:
     std::size_t MessageStart = 0;
     std::size_t MessageSize = 0;
     int Flags = 0;
-    bool InParts = false;
+    bool InsideMessage = false;
     double Heard = 0.0;
     double Pinged = 0.0;
 };
