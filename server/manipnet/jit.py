@@ -1,8 +1,11 @@
 """Compiled loops: numba's `njit` with a cache that notices every change of the package.
 
-Numba keeps compiled code per function and renews it when that function's own file changes, not when a constant or a
-function it uses does. Here the cache folder is named by the state of the whole package, so an update never runs stale
-machine code, and it is the user's own folder, so a read-only installation is cached too.
+Numba caches compiled code per function and renews it when the file of that function changes, but not when a constant or
+a function that it uses changes. So the cache folder is named after the state of the whole package, and an update never
+runs stale machine code. The folder belongs to the user, so a read-only installation is cached too.
+
+With `NUMBA_DISABLE_JIT=1` in the environment nothing is compiled and every kernel is a Python function that a debugger
+can step through, many times slower.
 """
 
 import hashlib
@@ -26,56 +29,55 @@ from platformdirs import user_cache_dir
 from manipnet.common import kernel_cache
 
 kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # pyright: ignore
-"""A compiled function that Python calls: cached on disk, without the interpreter's lock, x / 0 as NumPy has it.
+"""A compiled function that Python calls: cached on disk, without the interpreter's lock, with x / 0 as NumPy has it.
 
-Nothing in it allocates or counts references: counting those of a shape's arrays took longer than looking up distances.
+Kernels neither allocate nor count references, which for the arrays of a shape took longer than a distance query.
 """
 inner = njit(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore
-"""A compiled function that only kernels call: part of theirs in the cache, and without a way in that takes a tenth of
-the compiling."""
+"""A compiled function that only kernels call: it is part of theirs in the cache, and has no Python wrapper, which would
+add a tenth to the time of compiling."""
 
 
 def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
-    """A function for kernels that gives an array of this shape to work in, unfilled and gone when they return.
+    """A function for kernels that returns an array of this shape as working memory, on the stack and not initialised.
 
-    One place for each call in the source, so an array made in a loop is the same one every time round. With
-    `NUMBA_DISABLE_JIT=1`, kernels are plain Python, and so is the array.
+    Each call in the source has its own memory, so a call inside a loop returns the same array every time.
     """
     if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]: set at run time
         return lambda: np.empty(shape, as_dtype(dtype))
 
     @intrinsic
-    def array_on_stack(_):
-        kind = types.Array(dtype, len(shape), "C")
+    def allocate(_):
+        array_type = types.Array(dtype, len(shape), "C")
 
         def generate(context, builder, _signature, _arguments):
-            def number(value: int):
+            def constant(value: int):
                 return context.get_constant(types.intp, value)
 
             item = context.get_data_type(dtype)
             size = context.get_abi_sizeof(item)
-            strides = [number(size * math.prod(shape[axis + 1 :])) for axis in range(len(shape))]
-            data = cgutils.alloca_once(builder, item, size=number(math.prod(shape)))
-            array = make_array(kind)(context, builder)
-            populate_array(array, data, [number(length) for length in shape], strides, number(size), None)
+            strides = [constant(size * math.prod(shape[axis + 1 :])) for axis in range(len(shape))]
+            data = cgutils.alloca_once(builder, item, size=constant(math.prod(shape)))
+            array = make_array(array_type)(context, builder)
+            populate_array(array, data, [constant(length) for length in shape], strides, constant(size), None)
             return array._getvalue()
 
-        return kind(), generate
+        return array_type(), generate
 
-    return array_on_stack
+    return allocate
 
 
 matrix, vector = stack_array(3, 3), stack_array(3)
-"""Room for a rotation, and for a point or direction."""
+"""Working memory for a rotation, and for a point or direction."""
 
 COMPILED = ("geometry.py", "synthesis", "tracking")
-"""Where compiled functions are, and the constants they are compiled with; nothing else is part of the state."""
+"""Where compiled functions are, and the constants that are compiled into them; nothing else is part of the state."""
 
 _KEEP_S = 7 * 86400.0
 
 
 def cached(name: str) -> bool:
-    """Whether the kernel of this name is in the cache; True as well where there is no folder for it of our own."""
+    """Whether the kernel of this name is in the cache. True if there is no cache folder of our own, too."""
     return not config.CACHE_DIR or any(Path(config.CACHE_DIR).rglob(f"*.{name}-*.nbi"))  # pyright: ignore
 
 
@@ -109,7 +111,7 @@ def _use_own_cache() -> Path | None:
                 shutil.rmtree(old, ignore_errors=True)
         kernel_cache.check_cache(folder)
     except OSError:
-        return None  # numba then falls back to the folders it knows
+        return None  # numba then uses its default folders
     config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]: set at run time
     return folder
 

@@ -1,5 +1,6 @@
 """Clients that ask for ever more: the server stays bounded, publishes, and answers the others at once."""
 
+import json
 import threading
 import time
 from collections.abc import Iterator
@@ -84,7 +85,11 @@ def test_a_long_mesh_build_lets_others_be_answered(server: LiveServer, tmp_path:
     thread.join()
 
 
-def test_a_recording_that_begins_lets_others_be_answered(server: LiveServer) -> None:
+def test_a_recording_that_begins_lets_others_be_answered(server: LiveServer, tmp_path: Path) -> None:
+    # The new process reads the mesh, which is larger than a pipe, only once it has loaded its libraries.
+    trimesh.creation.icosphere(subdivisions=5, radius=0.05).export(tmp_path / "large.ply")
+    server.ask({"op": "add_object", "file": str(tmp_path / "large.ply")})
+    assert "error" not in server.ask({"op": "select_object", "body": "Box", "object": "large"})
     order: list[str] = []
 
     def record() -> None:
@@ -112,7 +117,7 @@ def test_a_recording_that_begins_lets_others_be_answered(server: LiveServer) -> 
     ],
 )
 def test_what_makes_no_sense_is_refused_by_its_reason(server: LiveServer, request_: dict) -> None:
-    error = server.ask(request_, as_json=True).get("error", "")
+    error = server.ask(json.dumps(request_).encode(), as_json=True).get("error", "")
     assert error
     assert "inside the server" not in error
 

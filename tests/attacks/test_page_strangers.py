@@ -1,5 +1,6 @@
 """The page in a real browser, against links, names and frames of strangers: none of their code runs."""
 
+import html
 import http.client
 import json
 import shutil
@@ -13,6 +14,9 @@ from browser import browsing
 from browser import serving as serving_files
 from live_server import LiveServer, Sender, scene, serving
 from websockets.sync.server import ServerConnection, serve
+
+from manipnet.page import panel
+from manipnet.page.markdown import escape
 
 BROWSER_S = 240.0
 FRAME = '<iframe srcdoc="<script>parent.hit=1</script>">'
@@ -122,3 +126,25 @@ def test_no_frame_of_a_foreign_page_shows_it(server: LiveServer, chromium: str, 
             frame["frame"]["url"].startswith("chrome-error:") or frame["frame"].get("unreachableUrl")
             for frame in frames
         )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_becomes_references_that_show_it_and_nothing_else(name: str) -> None:
+    escaped = escape(name)
+    assert html.unescape(escaped) == name
+    assert not set("<>[]|`*_\\") & set(escaped)
+
+
+def test_the_headline_warns_of_what_is_down_and_of_an_open_server() -> None:
+    status = {
+        "exposed": True,
+        "receivers": {
+            "zmq": {"state": "down", "restarts": 1, "error": f"ListenError: {FRAME}"},
+            "osc": {"state": "listening", "restarts": 3, "error": "OSError: gone"},
+        },
+    }
+    down, exposed = panel._warnings(status)
+    assert "zmq is down" in down
+    assert "<" not in down
+    assert "Open to every machine" in exposed
+    assert panel._warnings({"receivers": {}, "exposed": False}) == []

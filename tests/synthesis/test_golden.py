@@ -39,13 +39,13 @@ STRAY_RAYS = 3
 """Rays that graze an edge may go either way on another machine."""
 
 
-def compute(bundle: Bundle, cache: Path) -> dict[str, np.ndarray]:
-    """Every tick's features and hands, by name, `(TICKS, hands, …)`."""
+def compute(bundle: Bundle, cache: Path, count: int = TICKS) -> dict[str, np.ndarray]:
+    """The features and hands of the first `count` ticks, by name, `(count, hands, …)`."""
     shapes = [build_shape(gourd(triangles), cache) for triangles in (2000, 300)]
     synthesizer = Synthesizer(bundle)
     states = [synthesizer.rest_state() for _ in range(3)]
     ticks: list[dict[str, list[np.ndarray]]] = []
-    for tick in range(TICKS):
+    for tick in range(count):
         scenes = scenes_at(tick, shapes)
         rows = [_features(scene, state) for scene, state in zip(scenes, states, strict=True)]
         steps = synthesizer.step(scenes, states)

@@ -19,6 +19,8 @@ from manipnet.telemetry import CONTROL_OPS, Telemetry
 
 LOCAL_OPS: Final = ("add_object",)
 """Operations that open files of the server's machine."""
+STORING_OPS: Final = ("calibrate", "place_object")
+"""Operations that change the rig file on the server's machine unless the request has `"store": false`."""
 SLOW_OPS: Final = {
     "add_object": "objects",
     "select_object": "objects",
@@ -65,6 +67,11 @@ class Dispatcher:
                 raise RequestError(
                     f"{op} opens files of the server's machine, so only a client on that machine may ask; put the mesh "
                     "into the server's folder --objects and use select_object, or drop the mesh on the live page there"
+                )
+            if op in STORING_OPS and not here and request.get("store") is not False:
+                raise RequestError(
+                    f"{op} stores its result in the rig file on the server's machine, so only a client on that machine "
+                    'may ask; add "store": false to let the result be in force until the server stops'
                 )
             if op not in SLOW_OPS:
                 answer(self._meet(op, request), op)

@@ -148,6 +148,13 @@ class LivePage:
 
     def _send(self, ours: Connection) -> None:
         """Send the newest ticks, and each shape before the first tick that refers to it."""
+        try:
+            self._send_newest(ours)
+        except Exception:  # a page that shows nothing more must not look like one that does
+            _log.exception("frames cannot be sent to the page, so it starts again")
+            ours.close()
+
+    def _send_newest(self, ours: Connection) -> None:
         sent: set[str] = set()
         while not ours.closed:
             with self._arrived:

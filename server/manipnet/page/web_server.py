@@ -27,7 +27,10 @@ SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="u
 DROP_PATH: Final = "/drop"
 OPEN_S: Final = 10.0
 """A visitor that has not sent a whole request after this time is cut off."""
+MAX_DROPS: Final = 2
+"""Files of up to 50 MB that are taken in at once."""
 _POLICY_VIOLATION: Final = 1008
+_TRY_AGAIN_LATER: Final = 1013
 
 Dropped = Callable[[str, bytes], str]
 
@@ -53,6 +56,7 @@ def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server
 def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
     """Viser has no option for a socket or for origins, so the function that it calls is replaced meanwhile."""
     original = websockets.asyncio.server.serve
+    taking: set[object] = set()
     exposed = not is_loopback(listener.getsockname()[0])
 
     def serve(handler: Any, _host: str, _port: int, *, process_request: Any, **options: Any) -> Any:
@@ -61,7 +65,7 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
             assert request is not None
             OPERATOR.set(may_act(connection.remote_address[0], request.headers))
             if urlsplit(request.path).path == DROP_PATH:
-                await _take_in(connection, request, dropped)
+                await _take_in(connection, request, dropped, taking)
             else:
                 await handler(connection)
 
@@ -107,12 +111,21 @@ def may_act(address: str, headers: Any) -> bool:
     return is_loopback(address) and may_look(headers, exposed=False)
 
 
-async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
-    """Receive one file: its name is in the query, its content is the only message."""
+async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped, taking: set[object]) -> None:
+    """Receive one file: its name is in the query, its content is the only message. `taking` has the connections that
+    are sending files.
+    """
     if not OPERATOR.get():
         await connection.close(_POLICY_VIOLATION, "only a browser on the server's own machine may import files")
         return
+    if len(taking) >= MAX_DROPS:
+        await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_DROPS} files at a time")
+        return
     name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
-    with contextlib.suppress(ConnectionClosed):
-        content = await connection.recv(decode=False)
-        await connection.send(await asyncio.to_thread(dropped, name, content))
+    taking.add(connection)
+    try:
+        with contextlib.suppress(ConnectionClosed):
+            content = await connection.recv(decode=False)
+            await connection.send(await asyncio.to_thread(dropped, name, content))
+    finally:
+        taking.remove(connection)
