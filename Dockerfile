@@ -1,4 +1,4 @@
-# ManipNet Live: docker build -t manipnet . && docker run --rm -p 5555:5555 manipnet
+# ManipNet Live: docker build -t manipnet . && docker run --rm --network host manipnet
 FROM python:3.12-slim
 
 RUN useradd --create-home --uid 1000 manipnet
@@ -14,7 +14,7 @@ WORKDIR /home/manipnet
 ENV PYTHONUNBUFFERED=1
 EXPOSE 5555 5556 5557 39540/udp 8080 8081
 
-# The loopback address of a container is its own, so the server listens on all of its addresses. Publish only the ports
-# that you need, and only to networks that you trust.
+# The server listens on the loopback address, so it is reached from the same machine with `--network host`. A container
+# with a network of its own must be opened on purpose; docs/operations.md has the command.
 ENTRYPOINT ["manipnet-serve"]
-CMD ["--demo", "--host", "0.0.0.0", "--insecure"]
+CMD ["--demo"]

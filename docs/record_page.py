@@ -40,7 +40,7 @@ def main() -> None:
         seconds = record(server)
         with browsing("chromium", server.addresses["page"], Path(profile)) as page:
             set_up(page)
-            pictures = [picture(page, k / RATE_HZ) for k in range(int(seconds * RATE_HZ))]
+            pictures = [picture(page, k / RATE_HZ) for k in range(1, int(seconds * RATE_HZ))]  # it opened at 0
     (takes / f"{TAKE}.mcap").unlink()
     file = DOCS / "images" / "page.webp"
     pictures[0].save(
@@ -69,7 +69,7 @@ def set_up(page: Page) -> None:
     page.click("Takes", PATIENCE_S)
     page.wait_for(f"[...document.querySelectorAll('input')].some(field => field.value === '{TAKE}.mcap')", PATIENCE_S)
     page.click("Show this take", PATIENCE_S)
-    page.wait_for(f"{TEXT}.includes('Second')", PATIENCE_S)
+    page.wait_for(f"{TEXT}.includes('Time, s')", PATIENCE_S)
     x, y = 420.0, 250.0
     for _ in range(ZOOM_STEPS):
         page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-100)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from manipnet import cli, inputs
 from manipnet.common.options import Port, option
 from manipnet.inputs.declaration import Input, Receiver, Reception
+from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import UdpThread, bind_udp
 from manipnet.wire.bodies import MAX_TIME_S, BodyFrame, BodySample, check_distinct, check_name, make_sample
 
@@ -35,8 +36,17 @@ class TextBodies(Receiver):
     def start(self) -> None:
         """Bind the port and begin to receive."""
         udp = bind_udp(self._host, self._port)
-        self.address = "udp://{}:{}".format(*udp.getsockname())
-        self._thread = UdpThread(udp, self._receive, idle=lambda now_s: 0.1, lost=lambda count: None)
+        host, port = udp.getsockname()
+        self.address = f"udp://{host}:{port}"
+        health = ReceiverHealth("text", self._intake.telemetry)
+        self._thread = UdpThread(
+            udp,
+            reopen=lambda: bind_udp(host, port),
+            receive=self._receive,
+            idle=lambda now_s: 0.1,
+            lost=lambda count: None,
+            health=health,
+        )
         self._thread.start()
 
     def stop(self) -> None:

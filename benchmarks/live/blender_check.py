@@ -7,20 +7,23 @@ example `manipnet-serve --demo`. Blender without a window does not run timers, s
 extension's timer.
 """
 
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+
 import math
+import os
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-import bpy  # pyright: ignore[reportMissingImports]
+import bpy
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "clients" / "blender"))
-import package  # pyright: ignore[reportMissingImports]
+import package
 
 sys.path.insert(0, str(package.write_unpacked(Path(tempfile.mkdtemp())).parent))
-import manipnet_live  # pyright: ignore[reportMissingImports]
-from manipnet_live.session import session  # pyright: ignore[reportMissingImports]
+import manipnet_live
+from manipnet_live.session import session
 
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 KNUCKLES = ((0.04, 0.03), (0.1, 0.03), (0.105, 0.0), (0.1, -0.02), (0.09, -0.04))
@@ -85,8 +88,10 @@ def main():
     manipnet_live.unregister()
     print(
         f"Blender {bpy.app.version_string}: {stats.received} frames received, {stats.lost} lost, "
-        f"{frames} frames keyed on {len(keys)} curves, {len(seen)} different poses of a bone, {len(places)} of a wrist"
+        f"{frames} frames keyed on {len(keys)} curves, {len(seen)} different poses of a bone, {len(places)} of a wrist",
+        flush=True,
     )
 
 
 main()
+os._exit(0)  # the module of PyPI 4.5 hangs in its own cleanup when the interpreter exits normally

@@ -3,6 +3,7 @@
 This is the public API. Its names load on first use, so that `import manipnet` alone takes no time.
 """
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,10 @@ if TYPE_CHECKING:
     from manipnet.synthesis.model.bundle import load_bundle
     from manipnet.synthesis.objects.shape import load_shape
     from manipnet.synthesis.synthesizer import HandScene, Synthesizer
+
+# ONNX Runtime would write an identity of this device to the user's folder and queue events for its maker. The variable
+# must be set before its import, and holds in all processes that this one starts.
+os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
 __all__ = ["HandScene", "Server", "ServerConfig", "Synthesizer", "__version__", "load_bundle", "load_shape"]
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from manipnet import __version__, inputs, outputs
 from manipnet.common.options import ConfigError, options_of
+from manipnet.common.text_output import accept_any_text
 from manipnet.config.flags import add_flags, read_flags
 from manipnet.config.settings import (
     FILES,
@@ -74,6 +75,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Serve until SIGINT or SIGTERM. The exit status is 0 after a clean stop, and 1 if the server cannot run."""
+    accept_any_text()
     arguments = build_parser().parse_args(argv)
     try:
         config = configure(arguments)

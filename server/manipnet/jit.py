@@ -26,6 +26,8 @@ from numba.np.arrayobj import make_array, populate_array
 from numba.np.numpy_support import as_dtype
 from platformdirs import user_cache_dir
 
+from manipnet.common import kernel_cache
+
 kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # pyright: ignore
 """A compiled function that Python calls: cached on disk, without the interpreter's lock, with x / 0 as NumPy has it.
 
@@ -79,6 +81,12 @@ def cached(name: str) -> bool:
     return not config.CACHE_DIR or any(Path(config.CACHE_DIR).rglob(f"*.{name}-*.nbi"))  # pyright: ignore
 
 
+def seal_cache() -> None:
+    """Note what is in the cache now that everything is compiled, so that the next start notices damage."""
+    if _own_folder is not None:
+        kernel_cache.seal_cache(_own_folder)
+
+
 def _package_state() -> str:
     package = Path(__file__).parent
     digest = hashlib.sha256(numba.__version__.encode())
@@ -89,9 +97,10 @@ def _package_state() -> str:
     return digest.hexdigest()[:16]
 
 
-def _use_own_cache() -> None:
+def _use_own_cache() -> Path | None:
+    """Choose the folder of the cache, and return it; None if numba's own choice stands."""
     if os.environ.get("NUMBA_CACHE_DIR"):
-        return
+        return None
     root = Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False)) / "kernels"
     folder = root / _package_state()
     try:
@@ -100,9 +109,11 @@ def _use_own_cache() -> None:
         for old in root.iterdir():
             if time.time() - old.stat().st_mtime > _KEEP_S:
                 shutil.rmtree(old, ignore_errors=True)
+        kernel_cache.check_cache(folder)
     except OSError:
-        return  # numba then uses its default folders
+        return None  # numba then uses its default folders
     config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]: set at run time
+    return folder
 
 
-_use_own_cache()
+_own_folder = _use_own_cache()

@@ -9,7 +9,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from hdrh.histogram import HdrHistogram
@@ -44,6 +44,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "frames_dropped": ("reason", DROP_REASONS),
     "bodies_rejected": ("reason", BODY_REASONS),
     "sender_restarts": ("source", ()),
+    "receiver_restarts": ("source", ()),
     "connections_refused": ("reason", ("handshake", "not_listed", "too_many", "endless")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
@@ -78,6 +79,7 @@ class Telemetry:
         self._labels = dict(LABELS)
         self._counts: Counter[tuple[str, str]] = Counter()
         self._gauges: list[GaugeSource] = []
+        self._receivers: dict[str, Callable[[], Mapping[str, Any]]] = {}
 
     def count(self, name: str, n: int = 1, **label: str) -> None:
         """Raise a counter by `n`: `count("frames_dropped", reason="late")`.
@@ -119,6 +121,17 @@ class Telemetry:
         """Everything that is measured at this moment."""
         for source in tuple(self._gauges):
             yield from source()
+
+    def add_receiver(self, name: str, report: Callable[[], Mapping[str, Any]]) -> None:
+        """Let `receivers` include what `report` returns of the socket `name`."""
+        with self._lock:
+            self._receivers[name] = report
+
+    def receivers(self) -> dict[str, Mapping[str, Any]]:
+        """By name, whether each socket listens: `state` ("listening" or "down"), `restarts` and `error`."""
+        with self._lock:
+            receivers = dict(self._receivers)
+        return {name: report() for name, report in receivers.items()}
 
 
 class Timings:

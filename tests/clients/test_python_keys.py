@@ -1,5 +1,6 @@
 """The Python client with keys: on the list, not on it, with another server's key, and on a real server."""
 
+import socket
 import time
 from contextlib import contextmanager
 from threading import Thread
@@ -119,8 +120,10 @@ def test_a_server_without_curve_and_no_server_at_all(folder):
         port = pub.bind_to_random_port("tcp://127.0.0.1")
         with Client(f"tcp://127.0.0.1:{port}", keys=folder / "listed.toml") as client:
             wait_for_state(client, "does not use CURVE")
-        pub.unbind(f"tcp://127.0.0.1:{port}")
-        with Client(f"tcp://127.0.0.1:{port}", keys=folder / "listed.toml") as client:
+    with socket.socket() as reserved:
+        reserved.bind(("127.0.0.1", 0))  # without listening, so that connections to it are refused
+        address = f"tcp://127.0.0.1:{reserved.getsockname()[1]}"
+        with Client(address, keys=folder / "listed.toml") as client:
             wait_for_state(client, "no server answers")
 
 

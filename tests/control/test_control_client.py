@@ -9,6 +9,7 @@ import zmq
 
 from manipnet.common.options import ConfigError
 from manipnet.control.client import ControlClient
+from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.request import Request, RequestError
 from manipnet.control.service import Control
 from manipnet.net.curve_keys import make_client_keys, make_server_keys
@@ -28,7 +29,7 @@ HANDLERS = {"ping": ping, "look_ahead": refuse}
 
 @pytest.fixture
 def control() -> Iterator[Control]:
-    control = Control("127.0.0.1", 0, HANDLERS, Telemetry())
+    control = Control("127.0.0.1", 0, Dispatcher(HANDLERS, Telemetry()), Telemetry())
     control.start()
     yield control
     control.stop()
@@ -48,7 +49,7 @@ def test_a_refusal_is_the_servers_own_text(control: Control) -> None:
 def test_a_server_with_keys_answers_a_client_that_is_on_its_list(tmp_path: Path) -> None:
     keys = make_server_keys(tmp_path)
     ann = make_client_keys(tmp_path, "ann")
-    control = Control("127.0.0.1", 0, HANDLERS, Telemetry(), keys)
+    control = Control("127.0.0.1", 0, Dispatcher(HANDLERS, Telemetry()), Telemetry(), keys)
     control.start()
     try:
         assert ControlClient(control.address, ann).ask("ping")["time"] == 12.5

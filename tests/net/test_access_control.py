@@ -13,7 +13,7 @@ from manipnet.inputs.zeromq import ZEROMQ
 from manipnet.inputs.zeromq.receiver import ZmqBodies
 from manipnet.net import access_control as access
 from manipnet.net.access_control import AccessControl
-from manipnet.net.connection_limits import MAX_UNDELIVERED_BYTES, SMALL_TALK_BYTES, Connections
+from manipnet.net.connection_limits import MAX_UNDELIVERED_BYTES, MOST_WAITING, SMALL_TALK_BYTES, Connections
 from manipnet.net.zmq_socket import MAX_WIRE_BYTES
 from manipnet.telemetry import Telemetry
 
@@ -77,14 +77,6 @@ def speak_zmtp(address: str, kind: bytes) -> socket.socket:
     return tcp
 
 
-def is_turned_away(address: str) -> bool:
-    try:
-        with knock(address) as tcp:
-            return is_cut_off(tcp)
-    except ConnectionError:
-        return True
-
-
 def is_cut_off(tcp: socket.socket, while_sending: bytes = b"") -> bool:
     """Whether the other side ends the connection while we keep sending the same bytes."""
     tcp.setblocking(False)
@@ -105,7 +97,8 @@ def is_cut_off(tcp: socket.socket, while_sending: bytes = b"") -> bool:
 def test_one_connection_too_many_is_refused_and_counted_and_accepted_when_there_is_room(door):
     with zmq.Context() as context, ExitStack() as crowd:
         subs = [crowd.enter_context(subscribe(context, door)) for _ in range(MOST)]
-        assert is_turned_away(door.address)
+        with speak_zmtp(door.address, b"SUB") as late:
+            assert is_cut_off(late)
         assert door.refused()["too_many"] == 1
         assert len(door.keeper.connections) == MOST
         door.pub.send(b"news")
@@ -186,5 +179,115 @@ def test_a_descriptor_that_was_reused_is_not_touched(pair):
     with socket.create_server(("127.0.0.1", 0)) as other, open(__file__) as file:
         for descriptor in (other.fileno(), file.fileno(), 10_000):
             connections.opened(descriptor)
+        connections.look()
+        for descriptor in (other.fileno(), file.fileno(), 10_000):
+            connections.closed(descriptor)
     client.sendall(b"still there")
-    assert refused == ["too_many"] * 3
+    assert refused == ["handshake"] * 3
+
+
+class Crowd:
+    """Connections to a port, in the order in which they were accepted, and what becomes of them."""
+
+    def __init__(self, most: int = MOST) -> None:
+        self.refused: list[str] = []
+        self.now_s = 0.0
+        self.connections = Connections(most, self.refused.append, clock=lambda: self.now_s)
+        self._server = socket.create_server(("127.0.0.1", 0), backlog=1_000)
+        self.connections.listening(self._server.getsockname()[1])
+        self._accepted: list[socket.socket] = []
+        self._clients: list[socket.socket] = []
+
+    def enter(self, content: bytes = b"", source: str = "127.0.0.1") -> socket.socket:
+        """A connection that is accepted and has sent `content`."""
+        client = socket.create_connection(self._server.getsockname(), 20, (source, 0))
+        client.sendall(content)
+        accepted, _ = self._server.accept()
+        if content:
+            accepted.recv(len(content), socket.MSG_PEEK | socket.MSG_WAITALL)
+        self._accepted.append(accepted)
+        self._clients.append(client)
+        self.now_s += 1e-3
+        self.connections.opened(accepted.fileno())
+        return client
+
+    def close(self) -> None:
+        for each in (*self._accepted, *self._clients, self._server):
+            each.close()
+
+
+@pytest.fixture
+def crowd():
+    crowd = Crowd()
+    yield crowd
+    crowd.close()
+
+
+def is_open(client: socket.socket) -> bool:
+    client.setblocking(False)
+    try:
+        return client.recv(1) != b""
+    except BlockingIOError:
+        return True
+    except ConnectionError:
+        return False
+
+
+linux = pytest.mark.skipif(not hasattr(socket, "TCP_INFO"), reason="only Linux tells how far a connection has got")
+GREETING, HANDSHAKE = b"g" * 64, b"h" * 200
+
+
+@linux
+def test_those_that_have_got_least_far_lose_their_place_in_the_handshake_first(crowd):
+    listed = crowd.enter(HANDSHAKE)
+    greeted = [crowd.enter(GREETING) for _ in range(MOST_WAITING - 10)]
+    silent = [crowd.enter() for _ in range(MOST_WAITING)]
+    crowd.now_s += 1.0
+    crowd.connections.look()
+    assert is_open(listed)
+    assert all(map(is_open, greeted))
+    assert sum(map(is_open, silent)) == 9
+    assert all(map(is_open, silent[-9:])), "the newest are kept"
+
+
+@linux
+def test_a_crowd_from_one_address_does_not_cost_another_address_its_place(crowd):
+    lonely = crowd.enter(source="127.0.0.2")
+    for _ in range(3 * MOST_WAITING):
+        crowd.enter(GREETING)
+    assert is_open(lonely)
+    assert set(crowd.refused) == {"too_many"}
+
+
+@linux
+def test_admitted_connections_are_not_cut_by_a_crowd(crowd):
+    clients = [crowd.enter(HANDSHAKE) for _ in range(MOST)]
+    for _ in clients:
+        crowd.connections.succeeded()
+    crowd.connections.look()
+    assert len(crowd.connections) == MOST
+    for _ in range(5 * MOST_WAITING):
+        crowd.enter(HANDSHAKE)
+    assert all(map(is_open, clients))
+
+
+@linux
+def test_a_newcomer_is_not_cut_before_the_others(crowd):
+    for _ in range(MOST_WAITING):
+        crowd.enter(GREETING)
+    crowd.now_s += 1.0
+    newcomer = crowd.enter()
+    crowd.connections.look()
+    assert is_open(newcomer)
+
+
+def test_old_peers_are_refused_and_counted_while_others_may_connect(door):
+    with zmq.Context() as context, knock(door.address) as old:
+        old.sendall(b"\x01\x00\x03\x00hi")
+        assert is_cut_off(old)
+        for _ in range(2_000):
+            if door.refused():
+                break
+            door.pub.poll(10)
+        assert door.refused() == {"handshake": 1}
+        subscribe(context, door).close()

@@ -1,5 +1,6 @@
 """Keys and the allow-list, through real encrypted sockets on loopback."""
 
+import os
 import stat
 import sys
 
@@ -143,10 +144,42 @@ def test_keys_are_made_read_and_listed(folder):
     assert client.pair.secret not in (folder / ALLOW_FILE).read_text()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no file modes")
-def test_secrets_can_be_read_by_their_owner_only(folder):
-    for path in (folder / SERVER_FILE, make_client_keys(folder, "a")):
+posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no file modes")
+
+
+@posix
+@pytest.mark.parametrize("umask", [0, 0o077, 0o277])
+def test_files_can_be_used_by_their_owner_only_whatever_the_umask(tmp_path, umask):
+    before = os.umask(umask)
+    try:
+        make_server_keys(tmp_path)
+        client = make_client_keys(tmp_path, "a")
+    finally:
+        os.umask(before)
+    for path in (tmp_path / SERVER_FILE, tmp_path / ALLOW_FILE, client):
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
+
+
+@posix
+def test_a_secret_that_others_can_read_is_refused_with_the_remedy(folder):
+    client = make_client_keys(folder, "a")
+    for path, read in (
+        (folder / SERVER_FILE, lambda: read_server_keys(folder)),
+        (client, lambda: read_client_keys(client)),
+    ):
+        path.chmod(0o644)
+        with pytest.raises(KeyFileError, match=f"can read {path} .mode 644.; run: chmod 600 {path}"):
+            read()
+
+
+@posix
+def test_a_list_that_others_can_change_is_refused_with_the_remedy(folder):
+    path = folder / ALLOW_FILE
+    path.chmod(0o644)
+    assert read_allow_list(path) == {}
+    path.chmod(0o666)
+    with pytest.raises(KeyFileError, match=f"can change {path} .mode 666.; run: chmod 600 {path}"):
+        read_allow_list(path)
 
 
 def test_keys_are_never_replaced(folder):

@@ -9,6 +9,7 @@ import zmq
 from publisher import message
 
 from manipnet.config.settings import ServerConfig
+from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.service import Control
 from manipnet.inputs.zeromq import ZEROMQ
 from manipnet.inputs.zeromq.receiver import ZmqBodies
@@ -120,7 +121,7 @@ def test_a_list_that_cannot_be_read_is_named_and_leaves_nothing_open(tmp_path):
     threads = threading.active_count()
     for start in (
         lambda: publisher_of(Telemetry(), keys),
-        lambda: Control("127.0.0.1", 0, {}, Telemetry(), keys),
+        lambda: Control("127.0.0.1", 0, Dispatcher({}, Telemetry()), Telemetry(), keys),
         ZmqBodies(ZEROMQ.intake(print, Telemetry()), port=0, keys=keys).start,
     ):
         with pytest.raises(KeyFileError, match=r"cannot read .*clients\.allow"):
@@ -146,7 +147,7 @@ def test_clients_without_the_right_keys_can_do_nothing_and_are_counted(context, 
         receiver = ZmqBodies(ZEROMQ.intake(frames.append, bodies), port=0, keys=server)
         receiver.start()
         opened.callback(receiver.stop)
-        asked = Control("127.0.0.1", 0, {"ping": lambda request: {"t": 0.0}}, control, server)
+        asked = Control("127.0.0.1", 0, Dispatcher({"ping": lambda request: {"t": 0.0}}, control), control, server)
         opened.callback(asked.stop)
         asked.start()
         stranger = keys(server.pair.public)

@@ -6,7 +6,9 @@ from contextlib import ExitStack
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
+from websockets.typing import Origin
 
+from manipnet.net.half_open import MOST_HALF_OPEN
 from manipnet.outputs.websocket.server import MAX_CLIENTS, MAX_REQUESTS, WebSocketPublisher
 from manipnet.telemetry import Telemetry
 
@@ -67,6 +69,25 @@ def test_local_pages_may_connect(publisher, origin):
 def test_other_pages_may_not(publisher, origin):
     with pytest.raises(InvalidStatus, match="403"):
         connect(publisher.address, origin=origin)
+
+
+def test_a_refused_page_leaves_one_line_in_the_log(publisher, caplog):
+    for _ in range(2):  # the line of the first one is written when the second one is answered
+        with pytest.raises(InvalidStatus, match="403"):
+            connect(publisher.address, origin=Origin("https://example.com"))
+    record = next(record for record in caplog.records if record.name.startswith("manipnet"))
+    assert record.getMessage() == "refused a connection: invalid Origin header: https://example.com"
+    assert record.exc_info is None
+
+
+def test_a_client_comes_in_while_a_crowd_says_nothing(publisher, telemetry):
+    host, port = publisher.address.removeprefix("ws://").split(":")
+    with ExitStack() as crowd:
+        for _ in range(3 * MOST_HALF_OPEN):
+            crowd.enter_context(socket.create_connection((host, int(port)), 20))
+        with connect(publisher.address) as connection:
+            assert receive(publisher, connection, b"x") == b"x"
+    assert telemetry.counts()["connections_refused"]["too_many"] >= MOST_HALF_OPEN
 
 
 def test_the_number_of_clients_is_limited_and_refusals_are_counted(publisher, telemetry):

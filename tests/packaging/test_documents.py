@@ -49,3 +49,22 @@ def test_troubleshooting_quotes_what_the_programs_say() -> None:
     cells = re.findall(r"^\| ([^|]*`[^|]*) \|", page, re.M)
     quoted = [piece.strip() for cell in cells for code in re.findall(r"`([^`]*)`", cell) for piece in code.split("…")]
     assert [piece for piece in quoted if piece not in said] == []
+
+
+@pytest.mark.parametrize(
+    "path", ["CONTRIBUTING.md", "README.md", "RELEASING.md", "docs/architecture.md", "clients/README.md"]
+)
+def test_files_that_documents_name_are_there(path: str) -> None:
+    named = re.findall(
+        r"`((?:server|tools|tests|clients|docs|examples|benchmarks|models)/[\w./-]+)`",
+        (ROOT / path).read_text(encoding="utf-8"),
+    )
+    assert [name for name in named if not (ROOT / name).exists() and "NAME" not in name] == []
+
+
+def test_the_architecture_names_modules_that_are_there() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`((?!server/|tools/|tests/)[a-z_]+/[a-z_/]+)(?:\.py)?`", page)
+    folder = ROOT / "server" / "manipnet"
+    assert len(named) > 20
+    assert [name for name in named if not (folder / name).is_dir() and not (folder / f"{name}.py").is_file()] == []

@@ -60,5 +60,5 @@ def test_plain_content_passes(content: tuple) -> None:
 
 
 def test_what_is_no_part_of_the_conversation_is_not_sent() -> None:
-    with pytest.raises(TypeError, match="Popen has no place"):
+    with pytest.raises(TypeError, match="Popen cannot be sent"):
         pack("frame", type("Popen", (), {})())

@@ -13,9 +13,10 @@ from manipnet.actors.props import HYSTERESIS_M, Prop
 from manipnet.config.settings import default_actor
 from manipnet.runtime import shape_process
 from manipnet.runtime.mesh_watch import MeshWatch
-from manipnet.runtime.object_catalog import ObjectCatalog
+from manipnet.runtime.object_catalog import MAX_UNUSED, ObjectCatalog
 from manipnet.runtime.shape_process import make_shape
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
+from manipnet.synthesis.objects import shape_cache
 from manipnet.synthesis.objects.library import library_names
 from manipnet.synthesis.objects.mesh import MeshError
 from manipnet.synthesis.objects.shape import Shape
@@ -256,3 +257,46 @@ def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> Non
     finish.set()
     builder.join()
     assert "crate" in {shape.name for shape in catalog.shapes()}
+
+
+def test_added_objects_that_nobody_carries_are_given_back(tmp_path: Path) -> None:
+    catalog = ObjectCatalog()
+    box(tmp_path / "rig.stl", 0.05)
+    rig_hash = catalog.load(tmp_path / "rig.stl").content_hash
+    box(tmp_path / "held.stl", 0.06)
+    held = catalog.add(tmp_path / "held.stl")
+    for i in range(MAX_UNUSED + 5):
+        box(tmp_path / f"more{i}.stl", 0.07 + 1e-3 * i)
+        catalog.add(tmp_path / f"more{i}.stl")
+    names = set(catalog.names())
+    assert {"rig", "held", f"more{MAX_UNUSED + 4}"} <= names
+    assert not {f"more{i}" for i in range(5)} & names
+    assert catalog.shape("held") is held
+    assert catalog.shape("rig").content_hash == rig_hash, "it is built again"
+    assert len(catalog.shapes()) <= MAX_UNUSED + 1
+    with pytest.raises(MeshError, match="object 'more0' is unknown"):
+        catalog.shape("more0")
+
+
+def test_a_shape_that_is_asked_for_again_is_kept(tmp_path: Path) -> None:
+    catalog = ObjectCatalog()
+    box(tmp_path / "first.stl", 0.05)
+    catalog.add(tmp_path / "first.stl")
+    for i in range(2 * MAX_UNUSED):
+        box(tmp_path / f"more{i}.stl", 0.07 + 1e-3 * i)
+        catalog.add(tmp_path / f"more{i}.stl")
+        assert catalog.shape("first").name == "first"
+
+
+def test_the_folder_of_cached_shapes_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MANIPNET_CACHE", str(tmp_path / "cache"))
+    catalog = ObjectCatalog()
+    box(tmp_path / "first.stl", 0.05)
+    catalog.add(tmp_path / "first.stl")
+    (first,) = (tmp_path / "cache").glob("*.npz")
+    monkeypatch.setattr(shape_cache, "MAX_FOLDER_BYTES", int(3.5 * first.stat().st_size))
+    for i in range(4):
+        box(tmp_path / f"more{i}.stl", 0.07 + 1e-3 * i)
+        catalog.add(tmp_path / f"more{i}.stl")
+    assert 1 <= len(list((tmp_path / "cache").glob("*.npz"))) <= 4
+    assert not first.exists()

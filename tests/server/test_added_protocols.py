@@ -22,9 +22,11 @@ TOY_INPUT = '''
 
 import json
 from dataclasses import dataclass
+from functools import partial
 
 from manipnet.common.options import Choice, Port, option
 from manipnet.inputs.declaration import Input, Receiver, Reception
+from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import UdpThread, bind_udp
 from manipnet.wire.bodies import MessageError, parse_bodies
 
@@ -44,7 +46,9 @@ class Pigeons(Receiver):
     def start(self) -> None:
         udp = bind_udp(self._host, self._port)
         self.address = "pigeon://%s:%d" % udp.getsockname()
-        self._thread = UdpThread(udp, self._receive, lambda now_s: 0.1, lambda count: None)
+        reopen = partial(bind_udp, *udp.getsockname())
+        health = ReceiverHealth(self._intake.protocol, self._intake.telemetry)
+        self._thread = UdpThread(udp, reopen, self._receive, lambda now_s: 0.1, lambda count: None, health)
         self._thread.start()
 
     def stop(self) -> None:

@@ -72,8 +72,9 @@ class LiveServer:
             if keys is not None:
                 secure_client(req, keys)
             req.connect(self.addresses["control"])
-            packed = request if isinstance(request, bytes) else msgpack.packb(request)
-            req.send(json.dumps(request).encode() if as_json else packed)
+            if not isinstance(request, bytes):
+                request = json.dumps(request).encode() if as_json else msgpack.packb(request)
+            req.send(request)
             assert req.poll(int(1e3 * PATIENCE_S)), "no answer"
             return json.loads(req.recv()) if as_json else msgpack.unpackb(req.recv())
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from manipnet import __version__
+from manipnet.common.text_output import accept_any_text
 
 
 @dataclass(frozen=True)
@@ -158,6 +159,7 @@ EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "clus
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a verb; returns the exit status: 0 for success, 1 for an error, 2 for a mistyped command."""
+    accept_any_text()
     arguments = list(sys.argv[1:] if argv is None else argv)
     if not arguments or arguments[0] in ("-h", "--help"):
         print(help_text())

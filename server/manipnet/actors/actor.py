@@ -10,7 +10,7 @@ from manipnet.actors.live_hand import LiveHand
 from manipnet.actors.plan import Plan, make_scene
 from manipnet.actors.props import Prop, choose_prop
 from manipnet.actors.transitions import HOLD_AFTER_S, ShownHand, state_at_age
-from manipnet.config.settings import WRISTS, ActorConfig, BodyKey
+from manipnet.config.settings import MAX_OBJECTS, WRISTS, ActorConfig, BodyKey
 from manipnet.geometry import Array, compose, invert
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.objects.shape import Shape
@@ -33,6 +33,7 @@ class Actor:
         self.seq = 0
         """Number of the next message."""
         self.paused = False
+        """Whether both hands stay as they are shown."""
         self.model_hand = bundle.hand
         """The hand that is synthesised, of size 1."""
         limits = _limits(config, bundle)
@@ -45,6 +46,8 @@ class Actor:
         self._telemetry = telemetry
         self._roles, self._timeline = BodyRoles(config), Timeline(look_ahead_s)
         self._last: tuple[int, int] | None = None
+        self._tracked: frozenset[str] = frozenset()
+        """The roles whose bodies were tracked at the newest tick."""
 
     # --- the stream
 
@@ -119,14 +122,28 @@ class Actor:
     def carry(self, body: BodyKey, object_name: str, shape: Shape, scale: float) -> Prop:
         """Let a body, which is given by its key in the stream or by its role, carry an object from now on.
 
-        Raises `ValueError` for the body of a wrist.
+        If the actor has `MAX_OBJECTS` props already, a prop that was requested before is given back for a new one.
+        Raises `ValueError` for the body of a wrist, and if no prop can be given back.
         """
+        if self._roles.role(body) is None and len(self.props) >= MAX_OBJECTS:
+            self._give_back()
         name = self._roles.assign(body)
         if name in WRISTS:
             raise ValueError(f"body {body!r} is the {name}, which cannot carry an object; give the body of a prop")
         prop = Prop(name, object_name, shape, scale)
         self.props = [other for other in self.props if other.name != name] + [prop]
         return prop
+
+    def _give_back(self) -> None:
+        """Forget the prop that was requested longest ago: one that is not tracked, or else one that is not held."""
+        kept = {prop.name for prop in self.config.objects} | {hand.prop for hand in self.hands.values()}
+        free = [prop.name for prop in self.props if prop.name not in kept]
+        if not free:
+            raise ValueError(f"{self.config.name} has {MAX_OBJECTS} props already, which are of the rig or held")
+        name = next((name for name in free if name not in self._tracked), free[0])
+        self.props = [prop for prop in self.props if prop.name != name]
+        self._roles.forget(name)
+        self._timeline.forget(name)
 
     def reshape(self, old: Shape, new: Shape) -> None:
         """Replace the shape `old` by `new` in every prop."""
@@ -170,6 +187,7 @@ class Actor:
 
     def plan(self, tick: Tick) -> Plan:
         """Decide what each hand shows at a tick, and collect what its synthesis needs."""
+        self._tracked = frozenset(name for name, body in tick.bodies.items() if body.age_s <= HOLD_AFTER_S)
         states: dict[Side, State] = {}
         scenes: dict[Side, HandScene] = {}
         hand_states: dict[Side, HandState] = {}

@@ -39,6 +39,11 @@ class BodyRoles:
             self._roles |= dict.fromkeys(_same_body(body), role)
         return role
 
+    def forget(self, role: str) -> None:
+        """Let the body of a role be unknown again, and forget the role's offset."""
+        self._roles = {key: other for key, other in self._roles.items() if other != role}
+        self._offsets.pop(role, None)
+
     def offset(self, role: str) -> Array:
         """The frame of a wrist or prop in the frame of its body: T_body_role `(7,)`."""
         return self._offsets.get(role, NO_OFFSET)

@@ -144,6 +144,11 @@ class ServerConfig:
     rig: Path | None = None
     """The rig file that this configuration came from, in which calibrations are stored."""
 
+    @property
+    def is_exposed(self) -> bool:
+        """Whether machines that nobody has listed may connect, which only `insecure` allows."""
+        return not is_loopback(self.host) and (self.keys is None or not self.allow)
+
     def of(self, options: type[T]) -> T:
         """The options of one input or output, for example `config.of(OscOptions)`."""
         return next((given for given in self.protocols if type(given) is options), None) or options()
@@ -191,7 +196,7 @@ def check(config: ServerConfig) -> None:
     """Raise `ConfigError` unless a server can be started from `config`."""
     for declared in (config, *config.protocols):
         check_values(declared)
-    if not (is_loopback(config.host) or config.insecure or (config.keys is not None and config.allow)):
+    if config.is_exposed and not config.insecure:
         raise ConfigError(
             f"--host {config.host} can be reached from other machines, and nothing keeps strangers out. Give "
             "--keys FOLDER for ZeroMQ (see `manipnet keys`) and --allow NETWORK for OSC; or stay on 127.0.0.1 and use "

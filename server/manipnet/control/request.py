@@ -2,12 +2,15 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from manipnet.geometry import Array
+from manipnet.wire.bodies import MessageError, check_name
 
+MAX_ID: Final = 1 << 31
+MAX_DIGITS: Final = 10**60
 Request = Mapping[str, Any]
 Handler = Callable[[Request], dict[str, Any]]
 
@@ -19,10 +22,14 @@ class RequestError(ValueError):
 def number(request: Request, key: str, low: float, high: float, default: float | None = None) -> float:
     """A number within `low` … `high`. Raises `RequestError`."""
     value = request.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or (isinstance(value, float) and not math.isfinite(value))
+    ):
         raise RequestError(f"{key} is {quoted(value)}; it must be a number in {low} … {high}")
     if not low <= value <= high:
-        raise RequestError(f"{key} is {value}; allowed are {low} … {high}")
+        raise RequestError(f"{key} is {quoted(value)}; allowed are {low} … {high}")
     return float(value)
 
 
@@ -53,12 +60,21 @@ def choice(request: Request, key: str, allowed: tuple, default: Any = None) -> A
 def body_key(request: Request) -> int | str:
     """The streaming id or name of a body, from the key `body`. Raises `RequestError`."""
     body = request.get("body")
-    if isinstance(body, bool) or not isinstance(body, int | str) or not 0 < len(str(body)) <= 128:
+    if isinstance(body, int) and not isinstance(body, bool):
+        if not -MAX_ID <= body < MAX_ID:
+            raise RequestError(f"body is {quoted(body)}; a streaming id is an integer of at most 31 bits")
+        return body
+    if not isinstance(body, str):
         raise RequestError(f"body is {quoted(body)}; give the streaming id or the name of a body")
-    return body
+    try:
+        return check_name(body, "body")
+    except MessageError as error:
+        raise RequestError(str(error)) from None
 
 
 def quoted(value: Any) -> str:
     """A value of a request for an error message, at most 60 characters."""
+    if isinstance(value, int) and abs(value) >= MAX_DIGITS:
+        return "a huge integer"  # Python refuses to write it down
     text = "missing" if value is None else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}…"

@@ -1,55 +1,47 @@
-"""Requests from clients: a REP socket on a thread of its own, which answers in the encoding of the request."""
+"""Requests from clients: a ROUTER socket, which REQ sockets connect to, on a thread of its own."""
 
-import json
-import logging
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Final
 
-import msgpack
 import zmq
 
-from manipnet.control.request import Handler, Request, RequestError, quoted
+from manipnet.control.dispatcher import Dispatcher
 from manipnet.net.addresses import is_loopback
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import Throttle
+from manipnet.net.supervised import ReceiverHealth, SupervisedThread
 from manipnet.net.zmq_socket import BoundSocket
-from manipnet.telemetry import CONTROL_OPS, Telemetry
+from manipnet.telemetry import Telemetry
 
 MAX_REQUEST_BYTES: Final = 4096
 REQUESTS_PER_S: Final = 200
 BURST: Final = 50
 """Totals over all clients; above them, replies are delayed to protect tick time."""
-LOCAL_OPS: Final = ("add_object",)
-"""Operations that open files of the server's machine."""
-_OPS: Final = tuple(op for op in CONTROL_OPS if op != "invalid")
-_log = logging.getLogger(__name__)
+_ANSWERS: Final = "inproc://answers"
 
 
 class Control:
-    """Answers requests on `tcp://host:port` with `handlers`, one per operation, which run on the control thread."""
+    """Lets clients submit requests to `dispatcher` on `tcp://host:port`."""
 
     def __init__(
-        self,
-        host: str,
-        port: int,
-        handlers: Mapping[str, Handler],
-        telemetry: Telemetry,
-        keys: ServerKeys | None = None,
+        self, host: str, port: int, dispatcher: Dispatcher, telemetry: Telemetry, keys: ServerKeys | None = None
     ) -> None:
         """Bind the socket; `start` begins to answer. With `keys`, only clients on their list may ask.
 
         Raises `ListenError`.
         """
-        self._handlers, self._telemetry, self._throttle = handlers, telemetry, Throttle(REQUESTS_PER_S, BURST)
+        self._dispatcher, self._throttle = dispatcher, Throttle(REQUESTS_PER_S, BURST)
+        self._host, self._telemetry, self._keys = host, telemetry, keys
         try:
-            self._bound = BoundSocket(zmq.REP, host, port, telemetry, keys, MAX_REQUEST_BYTES)
+            self._door = self._open(port)
         except ListenError as error:
             raise ListenError(f"--control-port: {error}") from None
-        self.address = self._bound.address
-        self._thread = threading.Thread(target=self._run, name="control", daemon=True)
+        self.address = self._door.bound.address
+        self._health = ReceiverHealth("control", telemetry)
+        self._thread = SupervisedThread("control", self._health, self._run, self._reopen)
 
     def start(self) -> None:
         """Begin to answer."""
@@ -57,68 +49,88 @@ class Control:
 
     def stop(self) -> None:
         """Stop answering and free the port."""
+        self._thread.stopping.set()
+        self._door.stop_replies()
         if self._thread.is_alive():
-            self._bound.interrupt()
+            self._door.bound.interrupt()
             self._thread.join()
-        else:
-            self._bound.close()
+        self._door.close()
 
     def connected(self) -> int:
         """The number of connected clients. From any thread."""
-        return self._bound.connected()
+        return self._door.bound.connected()
+
+    def _open(self, port: int) -> "_Door":
+        return _Door(BoundSocket(zmq.ROUTER, self._host, port, self._telemetry, self._keys, MAX_REQUEST_BYTES))
+
+    def _reopen(self) -> None:
+        self._door.close()
+        self._door = self._open(int(self.address.rpartition(":")[2]))
 
     def _run(self) -> None:
-        with self._bound.socket as rep:
+        """Answer until the context is terminated, which raises `zmq.ContextTerminated`."""
+        door, poller = self._door, zmq.Poller()
+        with door.bound.socket as router, door.answers as answers:
+            poller.register(router, zmq.POLLIN)
+            poller.register(answers, zmq.POLLIN)
             while True:
-                try:
-                    frames = rep.recv_multipart(copy=False)
-                    self._bound.delivered(frames[0])
-                    time.sleep(self._throttle.delay_s(time.monotonic()))
-                    here = is_loopback(str(frames[0].get("Peer-Address")))
-                    rep.send(self.answer([frame.bytes for frame in frames], here))
-                except zmq.ContextTerminated:
-                    return
-                except zmq.ZMQError as error:
-                    _log.warning("control: an answer was lost: %s", error)
+                for ready, _ in poller.poll():
+                    if ready is answers:
+                        answer = answers.recv_multipart()
+                        self._guarded(router.send_multipart, answer)
+                    else:
+                        request = router.recv_multipart(copy=False)
+                        self._guarded(self._receive, door, request)
 
-    def answer(self, parts: list[bytes], here: bool = True) -> bytes:
-        """The answer to one message, whatever it holds; `here` tells whether it comes from this machine."""
-        as_json = bool(parts) and parts[0].lstrip()[:1] in (b"{", b"[")
-        op = "invalid"
+    def _guarded(self, action: Callable[..., object], *arguments: object) -> None:
+        """Handle one message; an error costs this message only."""
         try:
-            request = _decode(parts)
-            op = _operation(request)
-            if op in LOCAL_OPS and not here:
-                raise RequestError(
-                    f"{op} opens files of the server's machine, so only a client on that machine may ask; put the mesh "
-                    "into the server's folder --objects and use select_object, or drop the mesh on the live page there"
-                )
-            reply = self._handlers[op](request)
-        except RequestError as error:
-            reply = {"error": str(error)}
-        except Exception as error:
-            _log.exception("control: the request %s failed", op)
-            reply = {"error": f"{op} failed because of a fault in the server: {type(error).__name__}: {error}"}
-        self._telemetry.count("control_requests", op=op)
-        return json.dumps(reply).encode() if as_json else msgpack.packb(reply) or b""
+            action(*arguments)
+        except zmq.ContextTerminated:
+            raise
+        except Exception:
+            self._health.message_failed()
+
+    def _receive(self, door: "_Door", frames: list[zmq.Frame]) -> None:
+        """One message: the client's identity, an empty frame, and the request."""
+        door.bound.delivered(frames[0])
+        time.sleep(self._throttle.delay_s(time.monotonic()))
+        identity, *rest = frames
+        if not rest or rest[0].bytes:  # not from a REQ socket, which alone could read an answer
+            return
+        envelope = [identity.bytes, b""]
+        here = is_loopback(str(identity.get("Peer-Address")))
+        self._dispatcher.submit(
+            [frame.bytes for frame in rest[1:]], lambda answer: door.reply([*envelope, answer]), here
+        )
 
 
-def _decode(parts: list[bytes]) -> Request:
-    if len(parts) != 1:
-        raise RequestError(f"the request has {len(parts)} frames; send one, a msgpack or JSON map")
-    try:
-        text = parts[0].lstrip()
-        request = json.loads(text) if text[:1] in (b"{", b"[") else msgpack.unpackb(parts[0])
-    except Exception as error:  # the decoders raise a dozen types of errors
-        reason = str(error)[:80] or type(error).__name__
-        raise RequestError(f"the request is neither a msgpack nor a JSON map: {reason}") from None
-    if not isinstance(request, dict):
-        raise RequestError(f"the request is of type {type(request).__name__}; it must be a map with the key op")
-    return request
+class _Door:
+    """The bound socket, and the way from the threads that meet requests to it, in the same context."""
 
+    def __init__(self, bound: BoundSocket) -> None:
+        self.bound = bound
+        self.answers: zmq.Socket = bound.context.socket(zmq.PULL)
+        self.answers.setsockopt(zmq.LINGER, 0)
+        self.answers.bind(_ANSWERS)
+        self._replies: zmq.Socket = bound.context.socket(zmq.PUSH)
+        self._replies.setsockopt(zmq.LINGER, 0)
+        self._replies.connect(_ANSWERS)
+        self._replying = threading.Lock()
 
-def _operation(request: Request) -> str:
-    op = request.get("op")
-    if not isinstance(op, str) or op not in _OPS:
-        raise RequestError(f"op is {quoted(op)}; allowed are {', '.join(_OPS)}")
-    return op
+    def reply(self, message: list[bytes]) -> None:
+        """Let the thread of the bound socket send an answer. From any thread; does nothing after `stop_replies`."""
+        with self._replying:
+            if not self._replies.closed:
+                self._replies.send_multipart(message)
+
+    def stop_replies(self) -> None:
+        """Close what `reply` uses, so that the context can end. From any thread."""
+        with self._replying:
+            self._replies.close()
+
+    def close(self) -> None:
+        """Close everything. Belongs to the thread that uses the bound socket, or comes after its end."""
+        self.stop_replies()
+        self.answers.close()
+        self.bound.close()

@@ -111,7 +111,7 @@ class SessionRequests:
 
     def _add_object(self, request: Request) -> dict[str, Any]:
         file = request.get("file")
-        if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH:
+        if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH or "\0" in file:
             raise RequestError("file is missing or is not a path; give the path of a mesh on the server's machine")
         try:
             shape = self._catalog.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))

@@ -19,6 +19,20 @@ RESTART_S = 1.0
 
 
 @dataclass(slots=True)
+class _Pace:
+    """How fast the clock of a sender runs: where the current period began, and the speed in the period before."""
+
+    since_s: float
+    since_t_s: float
+    speed: float | None = None
+
+    def note(self, t_s: float, now_s: float) -> None:
+        if now_s - self.since_s >= RATE_S:
+            self.speed = (t_s - self.since_t_s) / (now_s - self.since_s)
+            self.since_s, self.since_t_s = now_s, t_s
+
+
+@dataclass(slots=True)
 class _Sender:
     frames: int
     heard_s: float
@@ -28,6 +42,7 @@ class _Sender:
     clocked_s: float
     offset_s: float
     offset_before_s: float
+    pace: _Pace
 
 
 class SenderStats:
@@ -44,7 +59,10 @@ class SenderStats:
         self._sink(frame)
 
     def report(self, now_s: float) -> dict[str, dict[str, float | int | None]]:
-        """For each source: frames so far, frames per second, age of the newest frame, offset of its clock from ours."""
+        """For each source: frames so far, frames per second, age of the newest frame, offset of its clock from ours.
+
+        `clock_speed` is how many seconds of its clock pass in one of ours, or None in its first second.
+        """
         with self._lock:
             return {
                 source: {
@@ -53,6 +71,7 @@ class SenderStats:
                     "age_s": max(now_s - sender.heard_s, 0.0),
                     "clock_offset_s": max(sender.offset_s, sender.offset_before_s),
                     "clock_uncertainty_s": None,
+                    "clock_speed": sender.pace.speed,
                 }
                 for source, sender in self._senders.items()
             }
@@ -60,13 +79,14 @@ class SenderStats:
     def _note(self, frame: BodyFrame, now_s: float, offset_s: float) -> None:
         sender = self._senders.pop(frame.source, None)
         if sender is None or abs(offset_s - sender.offset_s) > RESTART_S:
-            frames = 0 if sender is None else sender.frames
-            sender = _Sender(frames, now_s, now_s, 0, 0.0, now_s, offset_s, offset_s)
+            frames, pace = (0, _Pace(now_s, frame.t_s)) if sender is None else (sender.frames, sender.pace)
+            sender = _Sender(frames, now_s, now_s, 0, 0.0, now_s, offset_s, offset_s, pace)
         if len(self._senders) >= MOST:
             del self._senders[next(iter(self._senders))]  # the sender that has been silent for longest
         self._senders[frame.source] = sender
         sender.frames += 1
         sender.heard_s = now_s
+        sender.pace.note(frame.t_s, now_s)
         sender.counted += 1
         if now_s - sender.rated_s >= RATE_S:
             sender.rate_hz = (sender.counted - 1) / (now_s - sender.rated_s)

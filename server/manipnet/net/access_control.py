@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections.abc import Callable
 from typing import Final
 
 import zmq
@@ -10,24 +11,23 @@ from zmq.utils.monitor import parse_monitor_message
 
 from manipnet.net.connection_limits import Connections
 from manipnet.net.curve_keys import ServerKeys
-from manipnet.net.zap import ZAP_ADDRESS, ClientList, secure_server
+from manipnet.net.zap import DOMAIN, ZAP_ADDRESS, ClientList, open_door, secure_server
 from manipnet.telemetry import LogThrottle, Telemetry
 
 MOST_CONNECTIONS: Final = 64
 HANDSHAKE_MS: Final = 5_000
 """A connection that has not completed its handshake is closed after this time."""
 LOOK_MS: Final = 200
+SOON_MS: Final = 20
+"""When to look again after a handshake has succeeded."""
 _LOG_PERIOD_S: Final = 5.0
 _REFUSED: Final = {
-    "handshake": "a client that has the wrong keys, or that does not speak ZeroMQ",
+    "handshake": "a client that has the wrong keys, or that does not speak ZMTP 3",
     "not_listed": "a client whose key is not in clients.allow",
-    "too_many": f"a client, since {MOST_CONNECTIONS} are connected already",
+    "too_many": "a client, since too many are connected or in the handshake",
     "endless": "a client that sends frames without end, but no message",
 }
-_FAILURES: Final = zmq.Event.HANDSHAKE_FAILED_PROTOCOL | zmq.Event.HANDSHAKE_FAILED_NO_DETAIL
-_EVENTS: Final = (
-    zmq.Event.LISTENING | zmq.Event.ACCEPTED | zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED | _FAILURES
-)
+_EVENTS: Final = zmq.Event.LISTENING | zmq.Event.ACCEPTED | zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED
 _log = logging.getLogger(__name__)
 
 
@@ -44,21 +44,23 @@ class AccessControl:
         telemetry: Telemetry,
         keys: ServerKeys | None = None,
         most: int = MOST_CONNECTIONS,
+        failed: Callable[[], object] = lambda: None,
     ) -> None:
-        """Call this before `socket` is bound. Raises `KeyFileError` for a list that cannot be read."""
-        self._telemetry = telemetry
-        self._clients = None if keys is None else ClientList(keys)
-        self.connections = Connections(most, self._refuse)
+        """Call this before `socket` is bound. Raises `KeyFileError` for a list that cannot be read.
+
+        `failed` is called on the thread when it cannot go on.
+        """
+        self._telemetry, self._failed = telemetry, failed
+        self._answer = open_door if keys is None else ClientList(keys).answer
+        self.connections = Connections(most, self._refuse, curve=keys is not None)
         self._log_throttle = LogThrottle(_LOG_PERIOD_S)
-        self._shaking, self._accepted_s = 0, float("-inf")
-        """The connections whose handshake has neither succeeded nor failed, and when the newest one was accepted."""
-        self._zap: zmq.Socket | None = None
         if keys is not None:
             secure_server(socket, keys)
-            zap = self._zap = context.socket(zmq.REP)
-            zap.setsockopt(zmq.LINGER, 0)
-            zap.bind(ZAP_ADDRESS)
+        socket.setsockopt(zmq.ZAP_DOMAIN, DOMAIN)
         socket.setsockopt(zmq.HANDSHAKE_IVL, HANDSHAKE_MS)
+        self._zap: zmq.Socket = context.socket(zmq.REP)
+        self._zap.setsockopt(zmq.LINGER, 0)
+        self._zap.bind(ZAP_ADDRESS)
         self._monitor = socket.get_monitor_socket(_EVENTS)
         self._thread = threading.Thread(target=self._run, name="access", daemon=True)
         self._thread.start()
@@ -68,57 +70,65 @@ class AccessControl:
         self._thread.join()
 
     def _run(self) -> None:
-        poller = zmq.Poller()
-        sockets = [self._monitor] if self._zap is None else [self._monitor, self._zap]
-        for socket in sockets:
-            poller.register(socket, zmq.POLLIN)
-        look_s = time.monotonic()
         try:
-            while True:
-                for socket, _ in poller.poll(LOOK_MS):
-                    if socket is self._monitor:
-                        self._note(socket.recv_multipart())
-                    elif self._clients is not None:
-                        self._answer(socket, self._clients)
-                if time.monotonic() - look_s >= 1e-3 * LOOK_MS:
-                    look_s = time.monotonic()
-                    self.connections.look()
-                    self._count_silent_failures(look_s)
+            self._serve()
         except zmq.ContextTerminated:
-            pass
+            return
+        except Exception:
+            _log.exception("nobody can connect any more, so the socket is opened again")
         finally:
-            for socket in sockets:
-                socket.close()
+            self._monitor.close()
+            self._zap.close()
+        self._failed()
+
+    def _serve(self) -> None:
+        poller = zmq.Poller()
+        poller.register(self._monitor, zmq.POLLIN)
+        poller.register(self._zap, zmq.POLLIN)
+        look_s = time.monotonic()
+        while True:
+            wait_ms = SOON_MS if self.connections.unsettled else LOOK_MS
+            for socket, _ in poller.poll(wait_ms):
+                if socket is self._monitor:
+                    self._guarded(self._note, socket.recv_multipart())
+                else:
+                    socket.send_multipart(self._reply(socket.recv_multipart()))
+            if time.monotonic() - look_s >= 1e-3 * wait_ms:
+                look_s = time.monotonic()
+                self._guarded(self.connections.look)
+
+    def _guarded(self, action: Callable[..., object], *arguments: object) -> None:
+        """Do something whose failure must not keep everybody out."""
+        try:
+            action(*arguments)
+        except Exception:
+            if self._log_throttle.admit("internal") is not None:
+                _log.exception("connections could not be checked; the next check follows")
 
     def _note(self, parts: list[bytes]) -> None:
         message = parse_monitor_message(parts)
         match message["event"]:
             case zmq.Event.ACCEPTED:
-                self._shaking += self.connections.opened(message["value"])
-                self._accepted_s = time.monotonic()
+                self.connections.opened(message["value"])
             case zmq.Event.HANDSHAKE_SUCCEEDED:
-                self._shaking -= 1
+                self.connections.succeeded()
             case zmq.Event.DISCONNECTED:
                 self.connections.closed(message["value"])
             case zmq.Event.LISTENING:
                 self.connections.listening(int(message["endpoint"].rpartition(b":")[2]))
-            case _:  # the client has no key, the wrong server key or no CURVE
-                self._shaking -= 1
-                self._refuse("handshake")
 
-    def _count_silent_failures(self, now_s: float) -> None:
-        """Count clients that do not speak ZeroMQ: they cause no event, but the event of success is missing."""
-        if self._shaking and now_s - self._accepted_s > 2e-3 * HANDSHAKE_MS:
-            for _ in range(self._shaking):
-                self._refuse("handshake")
-            self._shaking = 0
-
-    def _answer(self, zap: zmq.Socket, clients: ClientList) -> None:
-        reply, listed = clients.answer(zap.recv_multipart())
-        zap.send_multipart(reply)
-        if not listed:
-            self._shaking -= 1
+    def _reply(self, request: list[bytes]) -> list[bytes]:
+        """What is answered to a request of RFC 27; it must be answered, or nobody could connect any more."""
+        try:
+            reply, is_listed = self._answer(request)
+        except Exception:
+            if self._log_throttle.admit("internal") is not None:
+                _log.exception("a client was refused, since its key could not be checked")
+            reply, is_listed = [*request[:2], b"500", b"internal", b"", b""], False
+        if not is_listed:
+            self.connections.denied()
             self._refuse("not_listed")
+        return reply
 
     def _refuse(self, reason: str) -> None:
         self._telemetry.count("connections_refused", reason=reason)

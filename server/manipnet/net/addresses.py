@@ -2,6 +2,7 @@
 
 import ipaddress
 from collections.abc import Sequence
+from urllib.parse import urlsplit
 
 from manipnet.common.options import Network
 
@@ -33,3 +34,14 @@ def is_loopback(host: str) -> bool:
         return (getattr(address, "ipv4_mapped", None) or address).is_loopback
     except ValueError:
         return host == "localhost"
+
+
+def is_own_name(host: str) -> bool:
+    """Whether an HTTP header `Host` names this machine itself, so that no foreign page reached it by a name of its own.
+
+    Such a page is served under a name whose address is changed to this machine's later (DNS rebinding).
+    """
+    try:
+        return is_loopback(urlsplit(f"http://{host}").hostname or "")
+    except ValueError:
+        return False

@@ -7,9 +7,11 @@ cannot connect again.
 
 import os
 import re
+import stat
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import zmq
 
@@ -17,6 +19,8 @@ SERVER_FILE = "server.toml"
 ALLOW_FILE = "clients.allow"
 KEY_CHARS = 40
 MAX_FILE_BYTES = 1 << 20
+_NOBODY_ELSE, _NOBODY_ELSE_WRITES = 0o077, 0o022
+"""Permissions that others must not have: for a secret, and for the list of allowed clients."""
 
 
 class KeyFileError(ValueError):
@@ -56,7 +60,7 @@ def make_server_keys(folder: Path) -> ServerKeys:
     folder.mkdir(parents=True, exist_ok=True)
     pair = _new_pair()
     _write_secret(folder / SERVER_FILE, {"public": pair.public, "secret": pair.secret})
-    (folder / ALLOW_FILE).touch()
+    _create_private(folder / ALLOW_FILE, os.O_APPEND).close()
     return ServerKeys(pair, folder / ALLOW_FILE)
 
 
@@ -82,6 +86,7 @@ def read_server_keys(folder: Path) -> ServerKeys:
     path = folder / SERVER_FILE
     if not path.exists():
         raise KeyFileError(f"{path} does not exist; `manipnet keys make server` makes it")
+    _check_mode(path, _NOBODY_ELSE)
     values = _read(path, "public", "secret")
     return ServerKeys(KeyPair(values["public"], values["secret"]), folder / ALLOW_FILE)
 
@@ -90,6 +95,7 @@ def read_client_keys(path: Path) -> ClientKeys:
     """Read a client's file. Raises `KeyFileError`."""
     if not path.exists():
         raise KeyFileError(f"{path} does not exist; `manipnet keys make NAME` makes it on the server")
+    _check_mode(path, _NOBODY_ELSE)
     values = _read(path, "public", "secret", "server_public")
     return ClientKeys(path.stem, KeyPair(values["public"], values["secret"]), values["server_public"])
 
@@ -97,8 +103,9 @@ def read_client_keys(path: Path) -> ClientKeys:
 def read_allow_list(path: Path) -> dict[str, str]:
     """The names of the allowed clients by public key. Empty lines and lines that begin with `#` are ignored.
 
-    Raises `KeyFileError`.
+    Raises `KeyFileError`, also if other users of this machine may change the list.
     """
+    _check_mode(path, _NOBODY_ELSE_WRITES)
     try:
         lines = path.read_bytes()[:MAX_FILE_BYTES].decode("ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -126,11 +133,29 @@ def _new_pair() -> KeyPair:
 def _write_secret(path: Path, values: dict[str, str]) -> None:
     """Write a TOML file that only its owner can read. Z85 text has no quotes or backslashes, so nothing is escaped."""
     try:
-        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        file = _create_private(path, os.O_EXCL)
     except FileExistsError:
         raise KeyFileError(f"{path} already exists; delete it first to replace its key") from None
-    with os.fdopen(handle, "w", encoding="ascii") as file:
+    with file:
         file.writelines(f'{key} = "{value}"\n' for key, value in values.items())
+
+
+def _create_private(path: Path, how: int) -> TextIO:
+    """Create or open a file that only its owner can use, whatever the umask."""
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | how, 0o600)
+    if os.name == "posix":
+        os.fchmod(handle, 0o600)
+    return os.fdopen(handle, "w", encoding="ascii")
+
+
+def _check_mode(path: Path, forbidden: int) -> None:
+    """Raise `KeyFileError` if other users of this machine have one of the `forbidden` permissions; not on Windows."""
+    if os.name != "posix" or not path.exists():
+        return
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if mode & forbidden:
+        what = "change" if mode & 0o022 else "read"
+        raise KeyFileError(f"other users of this machine can {what} {path} (mode {mode:o}); run: chmod 600 {path}")
 
 
 def _read(path: Path, *keys: str) -> dict[str, str]:

@@ -1,17 +1,16 @@
 """UDP sockets, and a thread that reads one; used by OSC and NatNet."""
 
 import contextlib
-import logging
 import os
 import socket
 import struct
 import sys
-import threading
 import time
 from collections.abc import Callable
 
 from manipnet.common.options import ConfigError
 from manipnet.net.errors import ListenError, cannot_listen
+from manipnet.net.supervised import ReceiverHealth, SupervisedThread
 
 Address = tuple[str, int]
 Receive = Callable[[bytes, Address, float], None]
@@ -23,56 +22,76 @@ seconds."""
 RECEIVE_BUFFER_BYTES = 4 << 20
 DROPS_PERIOD_S = 0.2
 _SO_MEMINFO, _MEMINFO_WORDS, _MEMINFO_DROPS = 55, 9, 8
-_log = logging.getLogger(__name__)
 
 
 class UdpThread:
     """Reads the datagrams of one socket and passes them to `receive`, until it is stopped.
 
     A blocking receive with a timeout in the kernel costs one call per datagram, and needs no second descriptor to wake
-    it. `lost` is called with the number of datagrams that the kernel dropped (on Linux only).
+    it. `lost` is called with the number of datagrams that the kernel dropped (on Linux only). A socket that fails is
+    replaced by the one that `reopen` makes.
     """
 
-    def __init__(self, udp: socket.socket, receive: Receive, idle: Idle, lost: Callable[[int], None]) -> None:
+    def __init__(
+        self,
+        udp: socket.socket,
+        reopen: Callable[[], socket.socket],
+        receive: Receive,
+        idle: Idle,
+        lost: Callable[[int], None],
+        health: ReceiverHealth,
+    ) -> None:
         self.socket = udp
-        self._receive, self._idle, self._lost = receive, idle, lost
-        self._stopping = threading.Event()
+        self._open, self._receive, self._idle, self._lost, self._health = reopen, receive, idle, lost, health
         self._timeout_s = 0.0
         self._drops = 0
-        self._thread = threading.Thread(target=self._run, name=f"udp-{udp.getsockname()[1]}", daemon=True)
+        self._thread = SupervisedThread(f"udp-{udp.getsockname()[1]}", health, self._run, self._reopen)
 
     def start(self) -> None:
         self._thread.start()
 
     def stop(self) -> None:
         """Stop the thread and close the socket. Returns within the longest idle time."""
-        self._stopping.set()
+        self._thread.stopping.set()
         self._thread.join()
-        self.socket.close()
+        self._close()
 
     def _run(self) -> None:
+        """Read until `stopping` is set. Raises `OSError` when the socket has failed."""
         buffer = bytearray(65_536)
         view = memoryview(buffer)
         look_s = time.monotonic()
-        self._set_timeout(self._idle(look_s))
-        while not self._stopping.is_set():
+        self._set_timeout(self._next_s(look_s))
+        while not self._thread.stopping.is_set():
             try:
                 size, source = self.socket.recvfrom_into(buffer)
                 now_s = time.monotonic()
-                self._receive(bytes(view[:size]), source[:2], now_s)
-            except (BlockingIOError, TimeoutError, ConnectionResetError):
+            except (BlockingIOError, TimeoutError, InterruptedError, ConnectionResetError):
                 now_s = time.monotonic()  # nothing arrived, or (on Windows) an earlier reply was refused
-            except OSError as error:
-                now_s = time.monotonic()
-                if not self._stopping.is_set():
-                    _log.warning("UDP receive failed: %s", error)
-            except Exception:  # a bug in what it calls must not end the thread
-                now_s = time.monotonic()
-                _log.exception("a datagram could not be taken in")
-            self._set_timeout(self._idle(now_s))
+            else:
+                try:
+                    self._receive(bytes(view[:size]), source[:2], now_s)
+                except Exception:
+                    self._health.message_failed()
+            self._set_timeout(self._next_s(now_s))
             if now_s - look_s > DROPS_PERIOD_S:
                 look_s = now_s
                 self._count_drops()
+
+    def _next_s(self, now_s: float) -> float:
+        try:
+            return self._idle(now_s)
+        except Exception:
+            self._health.message_failed()
+            return DROPS_PERIOD_S
+
+    def _reopen(self) -> None:
+        self._close()
+        self.socket, self._timeout_s, self._drops = self._open(), 0.0, 0
+
+    def _close(self) -> None:
+        with contextlib.suppress(OSError):  # a socket that has failed may be closed already
+            self.socket.close()
 
     def _set_timeout(self, seconds: float) -> None:
         seconds = min(max(seconds, 0.001), 0.25)

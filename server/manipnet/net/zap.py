@@ -1,6 +1,7 @@
 """Keys of ZeroMQ connections: CURVE encryption, and a list of allowed clients, checked at each handshake (ZAP).
 
-CURVE alone would let in every client that knows the server's public key.
+CURVE alone would let in every client that knows the server's public key. Without keys, the same check keeps out old
+peers, whose messages could not be told from what a web page sends.
 """
 
 import logging
@@ -11,8 +12,20 @@ from zmq.utils import z85
 from manipnet.net.curve_keys import ClientKeys, KeyFileError, ServerKeys, read_allow_list
 
 ZAP_ADDRESS = "inproc://zeromq.zap.01"  # fixed by ZeroMQ's RFC 27
-_DOMAIN = b"manipnet"
+DOMAIN = b"manipnet"
 _log = logging.getLogger(__name__)
+
+
+def open_door(request: list[bytes]) -> tuple[list[bytes], bool]:
+    """The reply where no keys are required, and whether it lets in: any client of ZMTP 3.
+
+    ZeroMQ itself refuses the peers of ZMTP 1.0 and 2.0 wherever somebody answers such requests. It must, since anything
+    that is not ZeroMQ, such as a request of a web page, is read as ZMTP 1.0.
+    """
+    version, request_id, domain, _, _, mechanism, *_ = request
+    if domain == DOMAIN and mechanism == b"NULL":
+        return [version, request_id, b"200", b"OK", b"", b""], True
+    return [version, request_id, b"400", b"no keys here", b"", b""], False
 
 
 class ClientList:
@@ -29,7 +42,7 @@ class ClientList:
         """The reply of RFC 27, `[version, request id, status, text, user id, metadata]`, and whether it lets in."""
         version, request_id, domain, _, _, mechanism, *credentials = request
         name = None
-        if domain == _DOMAIN and mechanism == b"CURVE" and len(credentials) == 1:
+        if domain == DOMAIN and mechanism == b"CURVE" and len(credentials) == 1:
             name = self._names().get(z85.encode(credentials[0]).decode("ascii"))
         if name is None:
             return [version, request_id, b"400", b"not on the list", b"", b""], False
@@ -53,7 +66,6 @@ def secure_server(socket: zmq.Socket, keys: ServerKeys) -> None:
     socket.setsockopt(zmq.CURVE_SERVER, 1)
     socket.setsockopt_string(zmq.CURVE_PUBLICKEY, keys.pair.public)
     socket.setsockopt_string(zmq.CURVE_SECRETKEY, keys.pair.secret)
-    socket.setsockopt(zmq.ZAP_DOMAIN, _DOMAIN)
 
 
 def secure_client(socket: zmq.Socket, keys: ClientKeys) -> None:

@@ -2,6 +2,7 @@
 
 import ipaddress
 import socket
+import threading
 
 import zmq
 
@@ -41,12 +42,13 @@ class BoundSocket:
         A client that sends a message of more than `max_bytes` loses its connection.
         """
         endpoint, ipv6 = zmq_endpoint(host, port)
-        self._context = zmq.Context()
+        self.context = zmq.Context()
+        self._ending = threading.Lock()
         self._access: AccessControl | None = None
-        self.socket: zmq.Socket = self._context.socket(kind)
+        self.socket: zmq.Socket = self.context.socket(kind)
         _limit(self.socket, max_bytes, ipv6)
         try:
-            self._access = AccessControl(self._context, self.socket, telemetry, keys)
+            self._access = AccessControl(self.context, self.socket, telemetry, keys, failed=self._terminate)
             self.socket.bind(endpoint)
         except BaseException as error:
             self.close()
@@ -71,9 +73,14 @@ class BoundSocket:
 
     def interrupt(self) -> None:
         """Raise `zmq.ContextTerminated` in the thread that waits at the socket, and wait until it closes the socket."""
-        self._context.term()
+        self._terminate()
         if self._access is not None:
             self._access.join()
+
+    def _terminate(self) -> None:
+        """End the context once. The access control does so when it fails, so that the socket is opened again."""
+        if self._ending.acquire(blocking=False):
+            self.context.term()
 
 
 def connect(

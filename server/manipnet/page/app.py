@@ -21,14 +21,10 @@ from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.hand_file import read_hand
 
 REFRESH_S: Final = 0.5
-NICE: Final = 10
-"""The page has a lower priority than the server's ticks, which matters on a machine without a spare processor."""
 
 
 def serve(listener: socket.socket, connection: Connection, hand_file: Path) -> None:
     """Serve the page until the server ends, however it ends. `hand_file` describes the hand that is shown."""
-    if hasattr(os, "nice"):
-        os.nice(NICE)
     sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (viser prints there, but it is the server's)
     link = RpcClient(connection)
     logging.basicConfig(level=logging.WARNING, handlers=[RpcLog(link)], force=True)

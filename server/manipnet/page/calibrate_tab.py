@@ -7,6 +7,7 @@ from typing import Any, Final
 import viser
 
 from manipnet.page.controls import Ask, Perform
+from manipnet.page.markdown import escape
 
 COUNTDOWN_S: Final = 3
 """From the click to the request. The request uses the last 2 s, in which the hand that clicked must lie still."""
@@ -82,6 +83,8 @@ def report(answer: dict[str, Any]) -> str:
         lines += ["| | moved within | changed by |", "|---|--:|--:|"]
     for part, hand in answer["hands"].items():
         still, changed = (f"{hand[f'{what}_mm']:.1f} mm, {hand[f'{what}_deg']:.1f}°" for what in ("spread", "changed"))
-        lines.append(f"| {part} | {still} | {changed} |")
-    kept = f"stored in `{Path(answer['stored']).name}`" if answer.get("stored") else answer.get("note", "")
+        lines.append(f"| {escape(part)} | {still} | {changed} |")
+    kept = (
+        f"stored in {escape(Path(answer['stored']).name)}" if answer.get("stored") else escape(answer.get("note", ""))
+    )
     return "\n".join([*lines, "", kept])

@@ -12,10 +12,15 @@ from manipnet.geometry import Array, quat_exp, quat_log
 from manipnet.page.controls import Ask, Perform, by_visitor
 from manipnet.page.frames import Frame
 from manipnet.page.gizmo import Gizmo
+from manipnet.page.markdown import escape
 from manipnet.synthesis.objects.mesh import FORMATS
 from manipnet.synthesis.objects.units import UNITS_M
 
 NONES: Final[tuple[str, ...]] = ("none",)
+
+
+MAX_PROBLEM: Final = 600
+"""Characters of a problem with a mesh file that are shown."""
 
 
 class ObjectsTab:
@@ -67,7 +72,9 @@ class ObjectsTab:
         objects = tuple(answer["objects"])
         if self._object.options != objects:
             self._object.options = objects
-        self._problems.content = "\n".join(f"⚠ {text}\n" for text in answer.get("problems", {}).values())
+        self._problems.content = "\n".join(
+            f"⚠ {escape(text, MAX_PROBLEM)}\n" for text in answer.get("problems", {}).values()
+        )
         bodies = tuple(self._carried) or NONES
         if self._body.options != bodies:
             self._body.options = bodies

@@ -9,6 +9,7 @@ from manipnet.page.calibrate_tab import CalibrateTab
 from manipnet.page.charts import History, Plots
 from manipnet.page.controls import Action, Ask, by_visitor
 from manipnet.page.frames import Frame
+from manipnet.page.markdown import escape
 from manipnet.page.objects_tab import ObjectsTab
 from manipnet.page.overlays import OVERLAYS
 from manipnet.page.rpc import RefusedError
@@ -53,7 +54,7 @@ class Panel:
         try:
             self._refresh()
         except RefusedError as error:
-            self._headline.content = f"**The server does not answer:** {error}"
+            self._headline.content = f"**The server does not answer:** {escape(error)}"
 
     def _refresh(self) -> None:
         history = next(iter(self._show.histories.values()), None) or History()
@@ -120,13 +121,29 @@ class Panel:
 
 
 def _headline(show: Show, status: dict[str, Any], history: History) -> str:
+    return "\n\n".join([*_warnings(status), _activity(show, status, history)])
+
+
+def _warnings(status: dict[str, Any]) -> list[str]:
+    """What a visitor must know first: sockets that have failed, and a server that anybody may use."""
+    warnings = [
+        f"⚠ **{escape(name)} is down** and will be opened again: {escape(receiver['error'])}"
+        for name, receiver in status.get("receivers", {}).items()
+        if receiver["state"] == "down"
+    ]
+    if status.get("exposed"):
+        warnings.append("⚠ **Open to every machine** that reaches this one (`--insecure`)")
+    return warnings
+
+
+def _activity(show: Show, status: dict[str, Any], history: History) -> str:
     frames = show.live.values()
     if not frames:
         return "○ **Waiting for bodies.** Run `manipnet doctor` to find out why none arrive."
     latency = next(iter(frames)).message.latency_ms
     what = "◐ **Paused**" if _paused(status) else "● **Live**"
     if show.recording is not None:
-        what = f"▶ **{show.recording.name}**"
+        what = f"▶ **{escape(show.recording.name)}**"
     waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms processing"
     return f"{what} · {history.rate_hz:.0f} hands/s\n\n{waits}"
 
@@ -140,13 +157,15 @@ def _health(status: dict[str, Any]) -> str:
     hands = []
     for name, actor in status["actors"].items():
         if len(status["actors"]) > 1:
-            rows.append(f"| | **{name}** | | |")
+            rows.append(f"| | **{escape(name)}** | | |")
         for body, health in actor["bodies"].items():
             age_s, rate_hz = health["age_s"], health["rate_hz"]
             age = "never" if age_s is None or not math.isfinite(age_s) else _ago(age_s)
-            rows.append(f"| {DOTS[health['state']]} | {body} | {rate_hz or 0.0:.0f} | {age} |")
+            rows.append(f"| {DOTS[health['state']]} | {escape(body)} | {rate_hz or 0.0:.0f} | {age} |")
         for side, hand in actor["hands"].items():
-            hands.append(f"{side} hand **{hand['state']}**" + (f" on {hand['object']}" if hand["object"] else ""))
+            hands.append(
+                f"{side} hand **{hand['state']}**" + (f" on {escape(hand['object'])}" if hand["object"] else "")
+            )
     counters = status["counters"]
     lost = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
     refused = f"{lost} frames and bodies refused" if lost else "no frame or body refused"

@@ -40,18 +40,19 @@ RESTART_S: Final = (0.5, 30.0)
 LASTED_S: Final = 60.0
 
 _log = logging.getLogger(__name__)
-Answer = Callable[[list[bytes]], bytes]
+Submit = Callable[[list[bytes], Callable[[bytes], object]], None]
+"""Meets a request, and gives the answer to the function, on any thread."""
 
 
 class LivePage:
     """Listens from its creation until `stop`, and serves from `start` on. `see` belongs to the tick thread."""
 
-    def __init__(self, host: str, port: int, answer: Answer, telemetry: Telemetry, hand_file: Path) -> None:
-        """Raises `ListenError`. `answer` answers the requests of the page, as it does for any client; `hand_file`
+    def __init__(self, host: str, port: int, submit: Submit, telemetry: Telemetry, hand_file: Path) -> None:
+        """Raises `ListenError`. `submit` receives the requests of the page, as it does for any client; `hand_file`
         describes the hand that is shown."""
         self._listener = _listen(host, port)
         self.address = _url(host, self._listener.getsockname()[1])
-        self._answer, self._telemetry, self._hand_file = answer, telemetry, hand_file
+        self._submit, self._telemetry, self._hand_file = submit, telemetry, hand_file
         self.watched = False
         """Whether a browser is open; only then `see` is worth calling."""
         self._arrived, self._sending = threading.Condition(), threading.Lock()
@@ -137,12 +138,23 @@ class LivePage:
                 self.watched = content
             elif what == "ask":
                 number, request = content
-                self._send_message(ours, "answer", (number, self._answer([request])))
+
+                def reply(answer: bytes, number: int = number) -> None:
+                    self._send_message(ours, "answer", (number, answer))
+
+                self._submit([request], reply)
             elif what == "log":
                 _log.log(content[0], "%s", content[1])
 
     def _send(self, ours: Connection) -> None:
         """Send the newest ticks, and each shape before the first tick that refers to it."""
+        try:
+            self._send_newest(ours)
+        except Exception:  # a page that shows nothing more must not look like one that does
+            _log.exception("frames cannot be sent to the page, so it starts again")
+            ours.close()
+
+    def _send_newest(self, ours: Connection) -> None:
         sent: set[str] = set()
         while not ours.closed:
             with self._arrived:

@@ -8,6 +8,7 @@ from typing import Final
 import viser
 
 from manipnet.page.controls import Ask, Perform, by_visitor
+from manipnet.page.markdown import escape
 from manipnet.page.playback import read_recording
 from manipnet.page.show import Show
 
@@ -48,9 +49,8 @@ class TakesTab:
             self._recording = now is not None
             self._record.label = "Stop recording" if self._recording else "Record"
             self._record.icon = viser.Icon.PLAYER_STOP if self._recording else viser.Icon.PLAYER_RECORD
-        self._progress.content = (
-            f"● **{now['name']}** · {now['seconds']:.0f} s" if now else f"Takes are saved in `{self._folder}`"
-        )
+        recording = f"● **{escape(now['name'])}** · {now['seconds']:.0f} s" if now else ""
+        self._progress.content = recording or f"Takes are saved in {escape(self._folder)}"
 
     def _toggle_record(self) -> str | None:
         if not self._recording:

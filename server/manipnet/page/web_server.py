@@ -17,14 +17,20 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from manipnet.net.addresses import is_loopback
-from manipnet.outputs.websocket.server import LOCAL_PAGES
+from manipnet.net.half_open import BACKLOG, HalfOpen
+from manipnet.page import policy
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
 """Whether the visitor may change anything: a browser on this machine that shows a page of this machine."""
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
 """What the page adds to viser's client: a title, and the import of files that are dropped on it."""
 DROP_PATH: Final = "/drop"
+OPEN_S: Final = 10.0
+"""A visitor that has not sent a whole request after this time is cut off."""
+MAX_DROPS: Final = 2
+"""Files of up to 50 MB that are taken in at once."""
 _POLICY_VIOLATION: Final = 1008
+_TRY_AGAIN_LATER: Final = 1013
 
 Dropped = Callable[[str, bytes], str]
 
@@ -50,6 +56,7 @@ def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server
 def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
     """Viser has no option for a socket or for origins, so the function that it calls is replaced meanwhile."""
     original = websockets.asyncio.server.serve
+    taking: set[object] = set()
     exposed = not is_loopback(listener.getsockname()[0])
 
     def serve(handler: Any, _host: str, _port: int, *, process_request: Any, **options: Any) -> Any:
@@ -58,19 +65,31 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
             assert request is not None
             OPERATOR.set(may_act(connection.remote_address[0], request.headers))
             if urlsplit(request.path).path == DROP_PATH:
-                await _take_in(connection, request, dropped)
+                await _take_in(connection, request, dropped, taking)
             else:
                 await handler(connection)
 
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             if not may_look(request.headers, exposed):
                 return connection.respond(HTTPStatus.FORBIDDEN, "This page is not for other web sites.\n")
+            if (reason := policy.refusal(request)) is not None:
+                return connection.respond(HTTPStatus.BAD_REQUEST, reason)
             with contextlib.suppress(KeyError):  # the script is inserted into the uncompressed page
                 del request.headers["Accept-Encoding"]
             response = process_request(connection, request)
-            return _with_script(response) if urlsplit(request.path).path == "/" else response
+            if response is not None and policy.is_page(response, request):
+                policy.protect(response, SCRIPT)
+            return response
 
-        return original(handle, sock=listener, process_request=answer, **options)
+        return original(
+            handle,
+            sock=listener,
+            process_request=answer,
+            create_connection=HalfOpen().connection,
+            open_timeout=OPEN_S,
+            backlog=BACKLOG,
+            **options,
+        )
 
     websockets.asyncio.server.serve = serve  # pyright: ignore[reportAttributeAccessIssue]
     try:
@@ -80,13 +99,11 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
 
 
 def may_look(headers: Any, exposed: bool) -> bool:
-    """Whether a request comes from a page of this machine, from no page at all or, where other machines are let in,
-    from the page itself: no other web site open in the same browser may."""
-    origin, host = headers.get("Origin"), headers.get("Host", "")
-    local = LOCAL_PAGES.fullmatch(f"http://{host}") is not None
-    if origin is None:
-        return local or exposed
-    return (local and LOCAL_PAGES.fullmatch(origin) is not None) or (exposed and origin == f"http://{host}")
+    """Whether a request comes from the page itself or from no page at all, through an address of this machine or, where
+    other machines are let in, through any: no other web site open in the same browser may look, also none of this
+    machine."""
+    host, origin = headers.get("Host", ""), headers.get("Origin")
+    return policy.is_own_page(headers) or (exposed and origin in (None, f"http://{host}"))
 
 
 def may_act(address: str, headers: Any) -> bool:
@@ -94,20 +111,21 @@ def may_act(address: str, headers: Any) -> bool:
     return is_loopback(address) and may_look(headers, exposed=False)
 
 
-async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped) -> None:
-    """Receive one file: its name is in the query, its content is the only message."""
+async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped, taking: set[object]) -> None:
+    """Receive one file: its name is in the query, its content is the only message. `taking` has the connections that
+    are sending files.
+    """
     if not OPERATOR.get():
         await connection.close(_POLICY_VIOLATION, "only a browser on the server's own machine may import files")
         return
+    if len(taking) >= MAX_DROPS:
+        await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_DROPS} files at a time")
+        return
     name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
-    with contextlib.suppress(ConnectionClosed):
-        content = await connection.recv(decode=False)
-        await connection.send(await asyncio.to_thread(dropped, name, content))
-
-
-def _with_script(response: Response | None) -> Response | None:
-    if response is not None and response.status_code == HTTPStatus.OK:
-        response.body = (response.body or b"").replace(b"</body>", f"<script>{SCRIPT}</script></body>".encode(), 1)
-        del response.headers["Content-Length"]
-        response.headers["Content-Length"] = str(len(response.body))
-    return response
+    taking.add(connection)
+    try:
+        with contextlib.suppress(ConnectionClosed):
+            content = await connection.recv(decode=False)
+            await connection.send(await asyncio.to_thread(dropped, name, content))
+    finally:
+        taking.remove(connection)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -14,7 +15,11 @@ from manipnet.control.request import Handler, Request, RequestError
 from manipnet.recording.take import Take, TakeError
 from manipnet.telemetry import Telemetry
 
-NAME: Final = re.compile(r"[\w][\w .-]{0,63}")
+NAME: Final = re.compile(r"\w([\w .-]{0,62}[\w-])?")
+MIN_FREE_BYTES: Final = 64 << 20
+"""Space for a recording to begin: about a minute of one actor."""
+DEVICES: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)( *\..*)?", re.IGNORECASE)
+"""Names that stand for devices on Windows, whatever suffix they have."""
 
 About = Callable[[], tuple[dict[str, str], Sequence[Prop]]]
 """What a recording depends on: its metadata, and the props whose meshes it keeps."""
@@ -50,15 +55,31 @@ class Recorder:
     def _record(self, request: Request) -> dict[str, Any]:
         name = request.get("name", time.strftime("take %Y-%m-%d %H.%M.%S"))
         if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise RequestError(f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -")
+            raise RequestError(
+                f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
+                "not beginning or ending with a space or dot"
+            )
+        if DEVICES.fullmatch(name):
+            raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
         path = self._folder / (name.removesuffix(".mcap") + ".mcap")
         with self._lock:
             if (take := self._current()) is not None:
                 raise RequestError(f"{take.path.name} is being recorded; end it with stop_recording first")
+            self._check_space()
             if path.exists():
                 raise RequestError(f"{path.name} already exists; give another name")
             self._take = self._begin(path)
         return {"name": path.name, "folder": str(self._folder.resolve())}
+
+    def _check_space(self) -> None:
+        """Raise `RequestError` if the disk is full: a recording that has begun could only be cut off."""
+        folder = next((folder for folder in (self._folder, *self._folder.resolve().parents) if folder.is_dir()), None)
+        free = MIN_FREE_BYTES if folder is None else shutil.disk_usage(folder).free
+        if free < MIN_FREE_BYTES:
+            raise RequestError(
+                f"the disk of {self._folder.resolve()} has only {free >> 20} MB left, and a recording needs "
+                f"{MIN_FREE_BYTES >> 20} MB to begin; make room, or start the server with --takes on another disk"
+            )
 
     def _begin(self, path: Path) -> Take:
         try:
@@ -73,7 +94,7 @@ class Recorder:
 
     def _stop_recording(self, _: Request) -> dict[str, Any]:
         with self._lock:
-            take, self._take = self._current(), None
+            take, self._take = self._take, None
             if take is None:
                 raise RequestError("nothing is being recorded; begin with record")
             try:

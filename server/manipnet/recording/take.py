@@ -41,7 +41,8 @@ class Take:
     def __init__(self, path: Path, metadata: Mapping[str, str], meshes: Meshes, telemetry: Telemetry) -> None:
         self.path = path
         self.is_broken = False
-        """Whether the child has ended before its time."""
+        """Whether the child has ended before its time, for the reason in `problem`."""
+        self.problem = ""
         self._telemetry = telemetry
         self._begin_s = time.monotonic()
         self._waiting: deque[tuple[int, bytes]] = deque()
@@ -69,13 +70,20 @@ class Take:
         """
         self._finishing.set()
         self._thread.join(STOP_S)
+        if self.is_broken:
+            raise TakeError(self.problem)
+        answer = self._answer()
+        if "error" in answer:
+            raise TakeError(f"{self.path.name}: {answer['error']}")
+        return answer
+
+    def _answer(self) -> dict[str, Any]:
+        """What the child says at its end."""
         answer: dict[str, Any] = {"error": "the process that writes it does not answer"}
         with suppress(EOFError, OSError):
             if self._child.connection.poll(STOP_S):
                 answer = msgpack.unpackb(self._child.connection.recv_bytes())
         self._child.close(STOP_S)
-        if "error" in answer:
-            raise TakeError(f"{self.path.name}: {answer['error']}")
         return answer
 
     def _feed(self) -> None:
@@ -83,9 +91,14 @@ class Take:
         try:
             while not self._send_waiting():
                 self._finishing.wait(EVERY_S)
-        except OSError:
+        except Exception:  # the child has ended, so it has said why
+            reason = self._answer().get("error", "its process has ended")
+            self.problem = (
+                f"{self.path.name} has ended early ({reason}); what was written until then is kept, and "
+                f"`manipnet recover {self.path}` makes a whole recording of it"
+            )
             self.is_broken = True
-            _log.error("the recording %s ends here, because its process has ended; the session goes on", self.path.name)
+            _log.error("the recording %s; the session goes on", self.problem)
 
     def _send_waiting(self) -> bool:
         is_last = self._finishing.is_set()  # read first: nothing is left behind after that
@@ -118,6 +131,7 @@ def _write(connection: Connection, path: Path, metadata: dict[str, str], meshes:
                 writer.write_hands(message, time_ns)
                 counts["hands"] += 1
     except Exception as error:
-        answer = {"error": f"{type(error).__name__}: {error}"}
+        why = error.strerror if isinstance(error, OSError) and error.strerror else f"{type(error).__name__}: {error}"
+        answer = {"error": why}
     with suppress(OSError):
         connection.send_bytes(msgpack.packb(answer) or b"")

@@ -1,6 +1,7 @@
 """Lines for the person at the terminal, from a thread of their own: a stopped terminal must not stop the ticks."""
 
 import contextlib
+import errno
 import json
 import logging
 import queue
@@ -9,6 +10,7 @@ import threading
 import time
 from typing import Any, Final
 
+from manipnet.common.text_output import silence
 from manipnet.telemetry import RepeatFilter
 
 WAITING_LINES: Final = 200
@@ -39,6 +41,8 @@ class Console(logging.Handler):
         super().__init__()
         self.setFormatter(JsonFormatter() if as_json else logging.Formatter(LOG_FORMAT))
         self.addFilter(RepeatFilter())
+        self._is_quiet = False
+        """Whether standard output has no reader any more."""
         self._lines: queue.Queue[tuple[str, bool] | None] = queue.Queue(WAITING_LINES)
         self._thread = threading.Thread(target=self._write, name="console", daemon=True)
         self._thread.start()
@@ -66,6 +70,26 @@ class Console(logging.Handler):
         while (line := self._lines.get()) is not None:
             text, is_log = line
             try:
-                print(text, file=sys.stderr if is_log else sys.stdout, flush=True)
-            except (OSError, ValueError):  # the reader of the pipe is gone, but the server still serves its clients
-                return
+                self._print(text, is_log)
+            except Exception as error:  # a line may be lost, but not the lines after it
+                if is_log or not _is_gone(error):
+                    continue
+                self._is_quiet = True
+                silence(sys.stdout)
+                with contextlib.suppress(Exception):
+                    self._print(f"standard output cannot be written any more ({error}); the log goes on", True)
+
+    def _print(self, text: str, is_log: bool) -> None:
+        stream = sys.stderr if is_log else sys.stdout
+        if stream is None or (self._is_quiet and not is_log):
+            return
+        try:
+            print(text, file=stream, flush=True)
+        except UnicodeEncodeError:
+            encoding = stream.encoding or "ascii"
+            print(text.encode(encoding, "backslashreplace").decode(encoding), file=stream, flush=True)
+
+
+def _is_gone(error: Exception) -> bool:
+    """Whether an error says that nobody can read an output any more, unlike that of a full disk."""
+    return isinstance(error, BrokenPipeError | ValueError) or getattr(error, "errno", None) in (errno.EBADF, errno.EIO)

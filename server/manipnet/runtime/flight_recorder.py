@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
+from manipnet.common.atomic_file import replacing
 from manipnet.tracking.tick import Tick
 from manipnet.wire.bodies import BodyFrame
 
@@ -65,7 +66,8 @@ def _write(path: Path, error: Sequence[str], ticks: Sequence[Tick], frames: Sequ
     content = {"error": error, "ticks": [_tick(tick) for tick in ticks], "frames": [asdict(frame) for frame in frames]}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps(content), encoding="utf-8")
+        with replacing(path) as file:
+            file.write(json.dumps(content).encode("utf-8"))
     except OSError as problem:
         _log.error("the frames before an error cannot be written to %s: %s", path.parent, problem)
 

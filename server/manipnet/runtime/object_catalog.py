@@ -1,7 +1,9 @@
-"""The objects that a server knows or can load, by name: their shapes, each of which is built once."""
+"""The objects that a server knows or can load, by name: their shapes, each of which is built once while in use."""
 
 import logging
 import threading
+import weakref
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +15,8 @@ from manipnet.synthesis.objects.mesh import FORMATS, MeshError
 from manipnet.synthesis.objects.shape import Shape
 
 MAX_FOLDER_FILES: Final = 1000
+MAX_UNUSED: Final = 16
+"""Shapes that are kept although nobody may carry them: those that were asked for last."""
 _log = logging.getLogger(__name__)
 
 
@@ -28,8 +32,10 @@ class Source:
 class ObjectCatalog:
     """Shapes of the rig, of the user's `folder` and of the library. Thread-safe.
 
-    A shape is built on the thread that first asks for it. If two objects have the same name, the rig's comes before the
-    folder's, and the folder's before the library's.
+    A shape is built on the thread that first asks for it. It is kept while it is in use, and while it is among the
+    `MAX_UNUSED` that were asked for last. An object that a client has added is forgotten with its shape.
+
+    If two objects have the same name, the rig's comes before the folder's, and the folder's before the library's.
     """
 
     def __init__(
@@ -40,10 +46,12 @@ class ObjectCatalog:
         self._lock = threading.Lock()
         self._building = threading.Lock()
         self._sources: dict[str, Source] = {}
-        self._shapes: dict[Source, Shape] = {}
+        self._of_rig: set[Source] = set()
+        self._shapes: weakref.WeakValueDictionary[Source, Shape] = weakref.WeakValueDictionary()
+        self._newest = deque[Shape](maxlen=MAX_UNUSED)
         self._stamps: dict[Source, tuple[int, int]] = {}
         self._unsettled: dict[Source, tuple[int, int]] = {}
-        self._problems: dict[str, str] = {}
+        self._problems: dict[Source, str] = {}
 
     def load(self, file: Path, unit: str = "m", scale: float = 1.0) -> Shape:
         """The shape of a mesh file, which is an object from now on unless its name is taken. Raises `MeshError`."""
@@ -51,6 +59,7 @@ class ObjectCatalog:
         shape = self._built(source)
         with self._lock:
             self._sources.setdefault(shape.name, source)
+            self._of_rig.add(source)
         return shape
 
     def add(self, file: Path, unit: str = "m") -> Shape:
@@ -60,12 +69,14 @@ class ObjectCatalog:
             self._shapes.pop(source, None)
         shape = self._built(source)
         with self._lock:
+            self._forget_unused()
             self._sources[shape.name] = source
         return shape
 
     def names(self) -> tuple[str, ...]:
         """The names of all objects, in order."""
         with self._lock:
+            self._forget_unused()
             loaded = tuple(self._sources)
         return tuple(sorted({*loaded, *self._folder_files(), *library_names()}))
 
@@ -89,7 +100,7 @@ class ObjectCatalog:
     def problems(self) -> dict[str, str]:
         """By file name, why the newest content of a file cannot be used; the shape from before stays in use."""
         with self._lock:
-            return dict(self._problems)
+            return {source.path.name: text for source, text in self._problems.items()}
 
     def changed(self) -> list[tuple[Shape, Shape]]:
         """Build the shapes of changed files again; returns the old and the new shape of each.
@@ -97,8 +108,8 @@ class ObjectCatalog:
         A file counts as changed when it has stayed the same since the last call, so that nobody is still writing it.
         """
         with self._lock:
-            sources = tuple(self._shapes)
-        pairs = [(self._shapes[source], self._rebuilt(source)) for source in sources if self._has_settled(source)]
+            shapes = tuple(self._shapes.items())
+        pairs = [(shape, self._rebuilt(source)) for source, shape in shapes if self._has_settled(source)]
         return [(old, new) for old, new in pairs if new is not None and new.content_hash != old.content_hash]
 
     def _folder_files(self) -> dict[str, Path]:
@@ -124,6 +135,8 @@ class ObjectCatalog:
         with self._building:  # one shape at a time; a caller that needs no new shape does not wait for it
             with self._lock:
                 shape = self._shapes.get(source)
+                if shape is not None:
+                    self._keep(shape)
             return shape or self._build(source)
 
     def _rebuilt(self, source: Source) -> Shape | None:
@@ -133,19 +146,34 @@ class ObjectCatalog:
         except MeshError as error:
             _log.warning("a mesh file has changed, but its new content cannot be used: %s", error)
             with self._lock:
-                self._problems[source.path.name] = str(error)
+                self._problems[source] = str(error)
             return None
         _log.warning("%s has changed and is loaded again", source.path)
         return shape
 
     def _build(self, source: Source) -> Shape:
-        self._stamps[source] = _stamp(source.path) or (0, 0)
+        stamp = _stamp(source.path) or (0, 0)
         shape = self._build_shape(source.path, source.unit, source.scale)
         _ = shape.rays  # a tick must not be the first to ask for them
         with self._lock:
-            self._shapes[source] = shape
-            self._problems.pop(source.path.name, None)
+            self._shapes[source], self._stamps[source] = shape, stamp
+            self._keep(shape)
+            self._problems.pop(source, None)
         return shape
+
+    def _keep(self, shape: Shape) -> None:
+        """Note that a shape was asked for; the one for which nobody has asked for longest may go instead."""
+        if shape in self._newest:
+            self._newest.remove(shape)
+        self._newest.append(shape)
+
+    def _forget_unused(self) -> None:
+        """Forget the added objects whose shapes are gone, and what is known of their files."""
+        known = self._of_rig | set(self._shapes)
+        self._sources = {name: source for name, source in self._sources.items() if source in known}
+        for notes in (self._stamps, self._unsettled, self._problems):
+            for source in [source for source in notes if source not in known]:
+                del notes[source]
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:

@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from typing import Final
 
-from prometheus_client import CollectorRegistry, start_http_server
+from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.exposition import CONTENT_TYPE_LATEST
 from prometheus_client.registry import Collector
 
 from manipnet.net.errors import ListenError
+from manipnet.net.small_http import SmallHttpServer
 from manipnet.telemetry import STAGES, Telemetry
 
 QUANTILES: Final = (50.0, 99.0, 99.9, 100.0)
@@ -21,18 +23,16 @@ class MetricsPage:
         registry = CollectorRegistry()
         registry.register(_TelemetryCollector(telemetry))
         try:
-            self._server, self._thread = start_http_server(port, host, registry)
+            self._server = SmallHttpServer(host, port, CONTENT_TYPE_LATEST, lambda: generate_latest(registry))
         except OSError as error:
             raise ListenError(
                 f"--metrics-port: cannot listen on {host}:{port}: {error.strerror}; --metrics-port 0 takes a free one"
             ) from None
-        self.address = f"http://{host}:{self._server.server_port}/metrics"
+        self.address = f"http://{host}:{self._server.port}/metrics"
 
     def close(self) -> None:
         """Stop serving."""
-        self._server.shutdown()
-        self._server.server_close()
-        self._thread.join()
+        self._server.close()
 
 
 class _TelemetryCollector(Collector):

@@ -25,7 +25,11 @@ class SecondLines:
         self._messages = 0
 
     def next(self) -> str:
-        """The rate, the delay, both hands of each actor, and what was lost; to be called once per second."""
+        """What is down, the rate, the delay, both hands of each actor, and what was lost; call this once per second."""
+        down = [f"{name.upper()} IS DOWN" for name in down_receivers(self._telemetry)]
+        return " | ".join([*down, self._describe()])
+
+    def _describe(self) -> str:
         messages = sum(actor.seq for actor in self._actors)
         rate_hz, self._messages = messages - self._messages, messages
         if not any(actor.receiving for actor in self._actors):
@@ -55,7 +59,13 @@ def status(actors: Sequence[Actor], telemetry: Telemetry, now_s: float) -> dict[
         "actors": {actor.config.name: _actor(actor, now_s) for actor in actors},
         "delay_ms": {name: 1e3 * delay_s for name, delay_s in zip(DELAY_PERCENTILES, delays_s, strict=True)},
         "counters": telemetry.counts(),
+        "receivers": {name: dict(report) for name, report in telemetry.receivers().items()},
     }
+
+
+def down_receivers(telemetry: Telemetry) -> list[str]:
+    """The names of the sockets that have failed and are not open again yet."""
+    return [name for name, report in telemetry.receivers().items() if report["state"] == "down"]
 
 
 class SilenceWatch:

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Final
 
 from manipnet.common.options import ConfigError
 from manipnet.config.settings import ServerConfig, check
+from manipnet.jit import seal_cache
 from manipnet.net.curve_keys import read_server_keys
+from manipnet.runtime.clock_watch import ClockWatch
 from manipnet.runtime.status import SecondLines, SilenceWatch
 from manipnet.server.services import open_services
 from manipnet.server.session import Session
@@ -52,7 +54,7 @@ class Server:
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._session = Session(config, wait_for_kernels)
         self._seconds = SecondLines(self._session.actors, self._session.telemetry)
-        self._silence = SilenceWatch()
+        self._silence, self._clocks = SilenceWatch(), ClockWatch()
         self._demo = self._load_demo() if config.demo else None
 
     def run(self, stopping: Callable[[], bool] = lambda: False) -> None:
@@ -62,6 +64,7 @@ class Server:
         name is unknown.
         """
         self._session.warm_up()
+        seal_cache()
         with ExitStack() as opened:
             services = open_services(self._session, self._keys, opened)
             self.addresses = services.addresses
@@ -69,6 +72,12 @@ class Server:
             gc.collect()
             gc.freeze()
             self._say("ready " + " ".join(f"{what} {address}" for what, address in self.addresses.items()))
+            if self._session.config.is_exposed:
+                _log.warning(
+                    "--insecure: every machine that reaches %s may send bodies, receive hands and change the session; "
+                    "use --keys and --allow outside of a network that you trust",
+                    self._session.config.host,
+                )
             if self._demo is not None:
                 opened.callback(self._demo.stop)
                 self._demo.start(self.addresses["bodies"])
@@ -84,3 +93,4 @@ class Server:
     def _every_second(self, now_s: float) -> None:
         self._say(self._seconds.next())
         self._silence.look(self._session.actors, now_s)
+        self._clocks.look(self._session.senders.report(now_s), self._session.telemetry.counts())

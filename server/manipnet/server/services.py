@@ -4,6 +4,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Final
 
+from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.service import Control
 from manipnet.inputs import make_receivers, start_receivers
 from manipnet.net.curve_keys import ServerKeys
@@ -43,11 +44,13 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     meshes = MeshWatch(session.catalog, session.replace_shape)
     opened.callback(meshes.stop)
     meshes.start()
-    control = Control(config.host, config.control_port, {**session.handlers(), **recorder.handlers()}, telemetry, keys)
+    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers()}, telemetry)
+    opened.callback(dispatcher.close)
+    control = Control(config.host, config.control_port, dispatcher, telemetry, keys)
     opened.callback(control.stop)
     control.start()
     page_host = LOOPBACK if keys is not None else config.host  # browsers have no keys
-    page = LivePage(page_host, config.page_port, control.answer, telemetry, session.bundle.folder / HAND_FILE)
+    page = LivePage(page_host, config.page_port, dispatcher.submit, telemetry, session.bundle.folder / HAND_FILE)
     opened.callback(page.stop)
     page.start()
     receivers = make_receivers(config.of, session.senders, telemetry, config.host, keys, config.allow)

@@ -3,6 +3,7 @@
 import secrets
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 from platformdirs import user_log_path
 
@@ -13,7 +14,7 @@ from manipnet.config.settings import ActorConfig, ServerConfig
 from manipnet.control.actors_proxy import ActorsProxy
 from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.peers import Peers
-from manipnet.control.request import Handler
+from manipnet.control.request import Handler, Request
 from manipnet.control.session_requests import SessionRequests
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.recording.recorder import carried_objects
@@ -74,7 +75,12 @@ class Session:
         """The control requests about this session, one function per operation."""
         requests = SessionRequests(self.id, self.bundle, self._proxy, self.catalog, self.telemetry).handlers()
         calibration = CalibrationRequests(self._proxy, self.config.rig).handlers()
-        return {**requests, **calibration, **self.peers.handlers(requests["status"])}
+        own = requests["status"]
+
+        def status(request: Request) -> dict[str, Any]:
+            return {**own(request), "exposed": self.config.is_exposed}
+
+        return {**requests, **calibration, **self.peers.handlers(status)}
 
     def replace_shape(self, old: Shape, new: Shape) -> None:
         """Replace a shape in every prop between two ticks. From any thread; raises `RequestError`."""

@@ -26,6 +26,10 @@ class SenderHandover:
             if self.may_send(name, source, now_s):
                 self._owners[name] = (source, now_s)
 
+    def forget(self, name: str) -> None:
+        """Forget which sender moves a body."""
+        self._owners.pop(name, None)
+
     def restart(self, names: Iterable[str], source: str, now_s: float) -> None:
         """Give the clock and these bodies to `source`, and forget all other owners."""
         self._owners = dict.fromkeys((CLOCK, *names), (source, now_s))

@@ -139,6 +139,14 @@ class Timeline:
             if run is not None:
                 run.rebase(name, T_old_new)
 
+    def forget(self, name: str) -> None:
+        """Forget a body and its history."""
+        for run in (self._run, self._ending):
+            if run is not None:
+                run.tracks.pop(name, None)
+        self._senders.forget(name)
+        self._jumps.forget()
+
     def _begin(self, t_s: float, now_s: float) -> Run:
         """Start a run; the one before plays out by our clock until the first tick of the new one is due."""
         number = 0

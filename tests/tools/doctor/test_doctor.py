@@ -9,6 +9,7 @@ import pytest
 import zmq
 from fake_motive import FakeMotive
 
+from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.service import Control
 from manipnet.net.curve_keys import make_client_keys, make_server_keys, read_server_keys
 from manipnet.telemetry import Telemetry
@@ -152,7 +153,13 @@ def test_a_server_with_keys_is_asked_with_a_key(ports, capsys, monkeypatch, tmp_
     make_server_keys(tmp_path)
     path = make_client_keys(tmp_path, "stage-pc")
     handlers = {"status": lambda request: {"counters": {"frames_in": {"osc": 5}}, "actors": {}}}
-    control = Control("127.0.0.1", port(ports, "--control-port"), handlers, Telemetry(), read_server_keys(tmp_path))
+    control = Control(
+        "127.0.0.1",
+        port(ports, "--control-port"),
+        Dispatcher(handlers, Telemetry()),
+        Telemetry(),
+        read_server_keys(tmp_path),
+    )
     control.start()
     assert doctor.main([*ports, f"--key={path}"]) == 0
     control.stop()

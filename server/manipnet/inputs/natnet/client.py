@@ -1,5 +1,6 @@
 """A client of OptiTrack Motive: it connects, learns the version and the bodies' names, and keeps the stream alive."""
 
+import functools
 import logging
 import socket
 import time
@@ -26,6 +27,7 @@ from manipnet.net.addresses import AllowList
 from manipnet.net.clock_offset import ClockProbes
 from manipnet.net.errors import ListenError
 from manipnet.net.rate_limit import SourceRateLimiter
+from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import Address, UdpThread, bind_udp, join_multicast, local_address_towards
 from manipnet.telemetry import Gauge
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, make_sample
@@ -83,8 +85,15 @@ class NatNetBodies(Receiver):
             ) from None
         self._server = (str(resolved[0][4][0]), self._port)
         self._interface = self._interface or local_address_towards(*self._server)
-        command = bind_udp(self._interface, 0)
-        self._command = UdpThread(command, self._receive, self._do_chores, self._lost)
+        interface, health = self._interface, ReceiverHealth("natnet", self._intake.telemetry)
+        self._command = UdpThread(
+            bind_udp(interface, 0),
+            lambda: bind_udp(interface, 0),
+            self._receive,
+            self._do_chores,
+            self._lost,
+            health,
+        )
         self._command.start()
 
     def stop(self) -> None:
@@ -219,12 +228,14 @@ class NatNetBodies(Receiver):
         if not self._multicast:
             return None if info.multicast_group is None else _STREAMS_MULTICAST
         if self._data is None:
-            group = info.multicast_group or MULTICAST_GROUP
+            group, interface = info.multicast_group or MULTICAST_GROUP, self._interface or "0.0.0.0"
+            join = functools.partial(join_multicast, group, info.data_port, interface)
             try:
-                data = join_multicast(group, info.data_port, self._interface or "0.0.0.0")
+                data = join()
             except ListenError as error:
                 return str(error)
-            self._data = UdpThread(data, self._receive, lambda now_s: CHORES_S, self._lost)
+            health = ReceiverHealth("natnet-multicast", self._intake.telemetry)
+            self._data = UdpThread(data, join, self._receive, lambda now_s: CHORES_S, self._lost, health)
             self._data.start()
         return None
 

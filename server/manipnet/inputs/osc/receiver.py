@@ -1,5 +1,6 @@
 """Receives OSC on a bound UDP socket with a thread of its own, and gathers each sender's messages into frames."""
 
+import socket
 from collections.abc import Sequence
 
 from manipnet.common.options import Network
@@ -10,6 +11,7 @@ from manipnet.inputs.osc.packet import split_packet
 from manipnet.net.addresses import AllowList
 from manipnet.net.flood_filter import FloodFilter, FloodWatch
 from manipnet.net.rate_limit import SourceRateLimiter
+from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import Address, UdpThread, bind_udp
 from manipnet.wire.bodies import BodyFrame, MessageError
 
@@ -40,11 +42,11 @@ class OscBodies(Receiver):
 
     def start(self) -> None:
         """Bind and begin to receive. Raises `ListenError`."""
-        udp = bind_udp(self._host, self._port)
+        udp = self._open(self._port)
         host, port = udp.getsockname()[:2]
         self.address = f"udp://[{host}]:{port}" if ":" in host else f"udp://{host}:{port}"
-        self._flood = FloodWatch(FloodFilter(udp))
-        self._thread = UdpThread(udp, self._receive, self._idle, self._lost)
+        health = ReceiverHealth(self._intake.protocol, self._intake.telemetry)
+        self._thread = UdpThread(udp, lambda: self._open(port), self._receive, self._idle, self._lost, health)
         self._thread.start()
 
     def stop(self) -> None:
@@ -52,6 +54,11 @@ class OscBodies(Receiver):
         if self._thread is not None:
             self._thread.stop()
             self._thread = None
+
+    def _open(self, port: int) -> socket.socket:
+        udp = bind_udp(self._host, port)
+        self._flood = FloodWatch(FloodFilter(udp))
+        return udp
 
     def _receive(self, datagram: bytes, sender: Address, now_s: float) -> None:
         if not self._rate_limiter.admits(sender, now_s):

@@ -1,6 +1,5 @@
 """Receives body messages, which `docs/protocol-in.md` describes, on a bound SUB socket with a thread of its own."""
 
-import threading
 import time
 
 import zmq
@@ -9,6 +8,7 @@ from manipnet.inputs.base import Intake
 from manipnet.inputs.declaration import Receiver
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.rate_limit import SourceRateLimiter
+from manipnet.net.supervised import ReceiverHealth, SupervisedThread
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.wire.bodies import MAX_MESSAGE_BYTES, MessageError, parse_bodies
 
@@ -26,24 +26,28 @@ class ZmqBodies(Receiver):
         self._rate_limiter = SourceRateLimiter()
         self._host, self._port = host, port
         self._bound: BoundSocket | None = None
-        self._thread: threading.Thread | None = None
+        self._thread: SupervisedThread | None = None
         self.address = f"tcp://{host}:{port}"
 
     def start(self) -> None:
         """Bind and begin to receive. Raises `ListenError` and `KeyFileError`."""
-        bound = BoundSocket(zmq.SUB, self._host, self._port, self._intake.telemetry, self._keys)
-        bound.socket.subscribe(b"")
-        self.address, self._bound = bound.address, bound
+        self._bound = self._bind(self._port)
+        self.address = self._bound.address
+        self._health = ReceiverHealth(self._intake.protocol, self._intake.telemetry)
         # From here on, the socket belongs to the thread.
-        self._thread = threading.Thread(target=self._run, args=(bound,), name="zmq-bodies", daemon=True)
+        self._thread = SupervisedThread("zmq-bodies", self._health, self._run, self._reopen)
         self._thread.start()
 
     def stop(self) -> None:
         """Stop receiving and free the port. Does nothing if the receiver was not started."""
-        if self._thread is None or self._bound is None:
+        if self._thread is None:
             return
-        self._bound.interrupt()
+        self._thread.stopping.set()
+        if (bound := self._bound) is not None:
+            bound.interrupt()
         self._thread.join()
+        if (bound := self._bound) is not None:  # it was opened again in the meantime
+            bound.close()
         self._thread = self._bound = None
 
     def connected(self) -> int:
@@ -51,21 +55,41 @@ class ZmqBodies(Receiver):
         bound = self._bound
         return 0 if bound is None else bound.connected()
 
-    def _run(self, bound: BoundSocket) -> None:
+    def _bind(self, port: int) -> BoundSocket:
+        bound = BoundSocket(zmq.SUB, self._host, port, self._intake.telemetry, self._keys)
+        bound.socket.subscribe(b"")
+        return bound
+
+    def _reopen(self) -> None:
+        if self._bound is not None:
+            self._bound.close()
+            self._bound = None
+        self._bound = self._bind(int(self.address.rpartition(":")[2]))
+
+    def _run(self) -> None:
+        """Receive until the context is terminated, which raises `zmq.ContextTerminated`."""
+        bound = self._bound
+        assert bound is not None
         with bound.socket as subscriber:
             skipping = False
             while True:
+                part = subscriber.recv(copy=False)
                 try:
-                    part = subscriber.recv(copy=False)
-                except zmq.ContextTerminated:
-                    return
-                bound.delivered(part)
-                if part.more or skipping:  # the parts of a multipart message are skipped; its last one is reported
+                    skipping = self._take(bound, part, skipping)
+                except Exception:
                     skipping = part.more
-                    if not skipping:
-                        self._intake.drop("malformed", _source(part), "the message has several frames; send one")
-                    continue
-                self._receive(part)
+                    self._health.message_failed()
+
+    def _take(self, bound: BoundSocket, part: zmq.Frame, skipping: bool) -> bool:
+        """Take one part; returns whether the rest of its message is skipped."""
+        bound.delivered(part)
+        if part.more:
+            return True
+        if skipping:  # the parts of a multipart message are skipped; its last one is reported
+            self._intake.drop("malformed", _source(part), "the message has several frames; send one")
+        else:
+            self._receive(part)
+        return False
 
     def _receive(self, part: zmq.Frame) -> None:
         now_s = time.monotonic()

@@ -11,6 +11,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin
 
 from manipnet.net.errors import cannot_listen
+from manipnet.net.half_open import BACKLOG, HalfOpen, handshake_log
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
 from manipnet.telemetry import Telemetry
 
@@ -20,6 +21,9 @@ QUEUE_LENGTH = 8
 
 MAX_REQUEST_BYTES, MAX_REQUESTS = 1024, 16
 """Clients have no reason to send anything."""
+
+OPEN_S = 5.0
+"""A client that has not completed the handshake after this time is cut off."""
 
 LOCAL_PAGES = re.compile(r"https?://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 """The origins of pages that may connect. Other web sites in the same browser may not. Programs send none."""
@@ -75,7 +79,17 @@ class WebSocketPublisher(HandsOutput):
     async def _serve(self, host: str, port: int):
         origins: list[Origin | re.Pattern[str] | None] = [None, LOCAL_PAGES]
         return await serve(
-            self._feed, host, port, origins=origins, compression=None, max_size=MAX_REQUEST_BYTES, close_timeout=1
+            self._feed,
+            host,
+            port,
+            origins=origins,
+            compression=None,
+            max_size=MAX_REQUEST_BYTES,
+            close_timeout=1,
+            open_timeout=OPEN_S,
+            backlog=BACKLOG,
+            create_connection=HalfOpen(lambda: self._refuse("too_many")).connection,
+            logger=handshake_log(__name__),
         )
 
     async def _close(self) -> None:

@@ -1,0 +1,106 @@
+"""Cut files of the program's own, outputs that take no more, and a library that reports home: none stops a show."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from live_server import PATIENCE_S, START_S, free_ports
+
+OPTIONS = ("--mesh", "日本=hammer")
+"""A prop that is not among those whose shapes come with the program."""
+
+
+def start(folder: Path, tiny_bundle: Path, **environment: str) -> subprocess.Popen[bytes]:
+    """A server on free ports whose output is read as bytes."""
+    command = [sys.executable, "-m", "manipnet.cli", *free_ports(), "--model", str(tiny_bundle), *OPTIONS]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, **environment}, cwd=folder
+    )
+
+
+def end(server: subprocess.Popen[bytes]) -> tuple[bytes, bytes]:
+    """Stop it; what it wrote to both outputs."""
+    server.terminate()
+    written = server.communicate(timeout=PATIENCE_S)
+    assert server.returncode == 0, written[1].decode(errors="replace")
+    return written
+
+
+def wait_ready(server: subprocess.Popen[bytes]) -> None:
+    assert server.stdout is not None
+    assert server.stdout.readline().startswith(b"ready ")
+
+
+@pytest.fixture(scope="module")
+def kernels(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache that one start has filled."""
+    folder = tmp_path_factory.mktemp("cache")
+    for _ in range(2):
+        server = start(folder, tiny_bundle, MANIPNET_CACHE=str(folder))
+        wait_ready(server)
+        _, errors = end(server)
+    assert b"damaged" not in errors, "a start finds what the one before has left"
+    return folder
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc", ".npz"])
+def test_a_cut_cache_is_rebuilt_and_reported(kernels: Path, tiny_bundle: Path, tmp_path: Path, suffix: str) -> None:
+    cache = tmp_path / "cache"
+    shutil.copytree(kernels, cache)
+    files = sorted(cache.rglob(f"*{suffix}"))
+    assert files, f"the cache holds no {suffix}"
+    for file, kept in zip(files, (0.0, 0.5), strict=False):  # a few, since all of it takes long to compile
+        content = file.read_bytes()
+        file.write_bytes(content[: int(kept * len(content))])
+    server = start(tmp_path, tiny_bundle, MANIPNET_CACHE=str(cache))
+    wait_ready(server)
+    _, errors = end(server)
+    assert b"Traceback" not in errors
+    assert b"damaged" in errors
+
+
+def test_a_name_that_the_output_cannot_show_ends_nothing(tiny_bundle: Path, tmp_path: Path) -> None:
+    server = start(tmp_path, tiny_bundle, PYTHONIOENCODING="cp1252", PYTHONUTF8="0")
+    wait_ready(server)
+    assert server.stdout is not None
+    lines = [server.stdout.readline() for _ in range(3)]
+    assert all(lines)
+    end(server)
+
+
+def test_a_closed_pipe_leaves_the_log_alive(tiny_bundle: Path, tmp_path: Path) -> None:
+    server = start(tmp_path, tiny_bundle)
+    wait_ready(server)
+    assert server.stdout is not None
+    assert server.stderr is not None
+    server.stdout.close()
+    # Nobody sends bodies: the server says so on standard error a few seconds later, if it still says anything.
+    assert server.stderr.readline()
+    server.terminate()
+    server.stdout = None
+    server.communicate(timeout=PATIENCE_S)
+    assert server.returncode == 0
+
+
+def test_doctor_writes_its_report_in_a_narrow_encoding(tmp_path: Path) -> None:
+    report = tmp_path / "report.txt"
+    environment = {**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    command = [sys.executable, "-m", "manipnet_tools.cli", "doctor", "--seconds", "0.5", "--control-port", "1"]
+    with report.open("wb") as file:
+        done = subprocess.run(command, stdout=file, stderr=subprocess.PIPE, env=environment, timeout=START_S)
+    assert b"Error" not in done.stderr, done.stderr.decode(errors="replace")
+    assert report.stat().st_size > 0
+
+
+def test_no_library_reports_home(tiny_bundle: Path, tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    cache = os.environ.get("MANIPNET_CACHE") or str(Path.home() / ".cache" / "manipnet")
+    server = start(tmp_path, tiny_bundle, HOME=str(home), MANIPNET_CACHE=cache, XDG_CACHE_HOME=str(home / "cache"))
+    wait_ready(server)
+    end(server)
+    left = [str(path) for path in home.rglob("*") if "Microsoft" in str(path) or "onnxruntime" in path.name.lower()]
+    assert left == []

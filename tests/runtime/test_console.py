@@ -1,0 +1,72 @@
+"""The lines for the terminal: no text and no closed output ends the thread that writes them."""
+
+import io
+import logging
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from manipnet.common.text_output import accept_any_text
+from manipnet.runtime.console import Console
+
+
+@contextmanager
+def outputs(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Iterator[tuple[int, Path]]:
+    """Standard output is a pipe, and standard error a file, both in cp1252; the pipe's end to read, and the file.
+
+    A context manager rather than a fixture, since pytest puts its own streams in place before the test itself.
+    """
+    read, write = os.pipe()
+    errors = folder / "errors.txt"
+    with (
+        monkeypatch.context() as streams,
+        io.TextIOWrapper(os.fdopen(write, "wb"), encoding="cp1252") as stdout,
+        open(errors, "w", encoding="cp1252") as stderr,
+    ):
+        streams.setattr(sys, "stdout", stdout)
+        streams.setattr(sys, "stderr", stderr)
+        yield read, errors
+        streams.undo()
+
+
+def log(console: Console, text: str) -> None:
+    console.handle(logging.LogRecord("manipnet", logging.WARNING, "", 0, text, None, None))
+
+
+def test_what_an_output_cannot_show_is_escaped(monkeypatch, tmp_path):
+    with outputs(monkeypatch, tmp_path) as (read, errors):
+        console = Console()
+        console.say("日本 ä")
+        log(console, "→ one")
+        console.say("next")
+        console.close()
+        os.set_blocking(read, False)
+        assert os.read(read, 1000) == rb"\u65e5\u672c " + b"\xe4\nnext\n"
+        os.close(read)
+        assert r"\u2192 one" in errors.read_text(encoding="cp1252")
+
+
+def test_a_closed_output_leaves_the_log_alive_and_is_reported_once(monkeypatch, tmp_path):
+    with outputs(monkeypatch, tmp_path) as (read, errors):
+        os.close(read)
+        console = Console()
+        for i in range(3):
+            console.say(f"line {i}")
+            log(console, f"record {i}")
+        console.close()
+        text = errors.read_text(encoding="cp1252")
+    assert all(f"record {i}" in text for i in range(3))
+    assert text.count("standard output cannot be written any more") == 1
+
+
+def test_programs_accept_any_text(monkeypatch, tmp_path):
+    with outputs(monkeypatch, tmp_path) as (read, _):
+        accept_any_text()
+        print("→", flush=True)
+        os.set_blocking(read, False)
+        assert os.read(read, 100) == b"\\u2192\n"
+        os.close(read)
