@@ -1,9 +1,9 @@
-"""How far off forecasts of wrists and props are: `python benchmarks/forecasts.py DATASET`.
+"""Errors of forecasts of wrists and props: `python -m benchmarks.forecasts DATASET`.
 
-The fading velocity of `manipnet.tracking.forecast` beside a body that stands still and a linear predictor: at every
-horizon the displacement as a sum of the four last displacements (1, 2, 4, 8 sixtieths of a second ago), its weights
-fitted to the first four fifths of every take, with a tracker's noise, for wrists and props apart. Judged on the last
-fifth.
+It compares the fading velocity of `manipnet.tracking.forecast` with a body that stands still and with a linear
+predictor. The linear predictor's displacement at each horizon is a weighted sum of the displacements since 1, 2, 4 and
+8 sixtieths of a second ago. Its weights are fitted to the first four fifths of every take, with the noise of a tracker,
+separately for wrists and props. The errors are those on the last fifth.
 """
 
 import sys
@@ -21,7 +21,7 @@ SEEN_SHARE = 0.8
 NOISE = np.repeat([3e-4, np.radians(0.1)], 3)
 """Standard deviations per axis: metres, radians."""
 HISTORY = 12
-"""Ticks of the past that a forecast may look at."""
+"""Ticks of the past that a forecast may use."""
 
 
 def bodies(folder: Path) -> dict[str, list[Array]]:
@@ -35,21 +35,23 @@ def bodies(folder: Path) -> dict[str, list[Array]]:
 
 
 def shaken(poses: Array, rng: np.random.Generator) -> Array:
-    """With a tracker's noise."""
+    """The poses with the noise of a tracker."""
     noise = rng.normal(size=(len(poses), 6)) * NOISE
     turned = quat_multiply(quat_exp(noise[:, 3:]), poses[:, 3:])
     return np.concatenate([poses[:, :3] + noise[:, :3], turned], axis=1)
 
 
 def between(before: Array, after: Array) -> Array:
-    """Way and rotation vector from one pose to another, `(…, 6)`."""
+    """Displacement and rotation vector from one pose to another, `(..., 6)`."""
     turn = quat_log(quat_multiply(after[..., 3:], quat_conjugate(before[..., 3:])))
     return np.concatenate([after[..., :3] - before[..., :3], turn], axis=-1)
 
 
 def samples(true: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """At every tick: past displacements `(n, lags, 6)`, true ones to come `(n, ahead, 6)`, and what fading velocity
-    makes of the past."""
+    """Displacements at every tick: past ones `(n, lags, 6)`, true future ones `(n, ahead, 6)`, and predicted ones.
+
+    The predictions are those of the fading velocity.
+    """
     seen, at = shaken(true, rng), np.arange(HISTORY, len(true) - AHEAD[-1])
     past = np.stack([between(seen[at - lag], seen[at]) for lag in LAGS], axis=1)
     future = np.stack([between(seen[at], true[at + ahead]) for ahead in AHEAD], axis=1)
@@ -59,7 +61,7 @@ def samples(true: Array, rng: np.random.Generator) -> tuple[Array, Array, Array]
 
 
 def fitted(past: Array, future: Array) -> Array:
-    """Weights `(2, lags, ahead)` for positions and rotations with the least mean error, by reweighting."""
+    """Weights `(2, lags, ahead)` for positions and rotations with the least mean error, by iterative reweighting."""
     weights = np.empty((2, len(LAGS), len(AHEAD)))
     for part in range(2):
         x, y = past[..., 3 * part : 3 * part + 3], future[..., 3 * part : 3 * part + 3]
@@ -75,7 +77,7 @@ def fitted(past: Array, future: Array) -> Array:
 
 
 def main() -> None:
-    """Print mean errors per horizon."""
+    """Print the mean errors for each horizon."""
     rng = np.random.default_rng(0)
     print(f"fading velocity: time constants {FADE_S:g} s and, turning, {FADE_SPIN_S:g} s")
     print("mean error after    " + "".join(f"{TICK_S * ahead:8.2f} s" for ahead in AHEAD))

@@ -1,8 +1,8 @@
-"""ManipNet's tick as one would first write it: trimesh for every query, PyTorch for the network, NumPy in between.
+"""ManipNet's tick written in the straightforward way: trimesh for every query, PyTorch for the network, NumPy between.
 
-It computes the same features as the product (`tests/tools/test_straightforward.py` compares them) from the same
-meshes, without fields, trees of our own, caches or compiled code, and is what `manipnet bench` calls the
-straightforward version. It stops at the targets of the inverse kinematics: the solver itself would only add to it.
+It computes the same features as the product from the same meshes (`tests/tools/bench/test_straightforward.py` compares
+them), without distance fields, trees of our own, caches or compiled code. `manipnet bench` compares the product with
+it. It stops at the targets of inverse kinematics; a solver would only add to its time.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Network(torch.nn.Module):
         self.register_buffer("deviation", torch.ones(LAYOUT.input_size))
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:
-        """Features `(N, 2356)` to outputs `(N, 220)`."""
+        """Features `(N, input_size)` to outputs `(N, output_size)`."""
         x = (features - self.mean) / self.deviation
         x = torch.cat([encode(x[:, c]) for encode, c in zip(self.encoders, self.columns, strict=True)], dim=1)
         for first, second in (self.layers[:2], self.layers[2:]):
@@ -52,7 +52,7 @@ class Network(torch.nn.Module):
 
 @dataclass
 class View:
-    """One instant of a scene as a right hand's: maps from its wrist frame to the object's and back."""
+    """One instant of a scene as a right hand sees it, with the maps between its wrist frame and the object's."""
 
     wrist: np.ndarray
     object: np.ndarray
@@ -76,7 +76,7 @@ class View:
 
 
 class Straightforward:
-    """Ticks of hands about one mesh."""
+    """Ticks of hands that handle one mesh."""
 
     def __init__(self, vertices: np.ndarray, faces: np.ndarray, width: int) -> None:
         self.mesh = trimesh.Trimesh(vertices, faces, process=False)
@@ -90,7 +90,7 @@ class Straightforward:
         return [self._targets(scene, output) for scene, output in zip(scenes, outputs, strict=True)]
 
     def features(self, scene: HandScene, state: HandState) -> np.ndarray:
-        """The network's inputs `(2356,)` of one hand, float32."""
+        """The network's inputs `(input_size,)` for one hand, float32."""
         row = np.empty(LAYOUT.input_size, np.float32)
 
         def put(name: str, values: np.ndarray) -> None:

@@ -24,7 +24,7 @@ def test_product_and_rotation_agree_with_scipy(a, b, v):
 
 
 @given(quats)
-def test_matrix_there_and_back(q):
+def test_matrix_and_quaternion_are_inverse_conversions(q):
     back = g.matrix_to_quat(g.quat_to_matrix(q))
     np.testing.assert_allclose(np.abs(back @ q), 1.0, atol=1e-12)
 
@@ -44,13 +44,13 @@ def test_slerp_goes_the_short_way_at_constant_speed(a, b, fraction):
 
 
 @given(poses, poses, vectors)
-def test_composition_is_application_in_turn(a, b, p):
+def test_composition_applies_one_pose_after_the_other(a, b, p):
     np.testing.assert_allclose(g.transform(g.compose(a, b), p), g.transform(a, g.transform(b, p)), atol=1e-10)
     np.testing.assert_allclose(g.transform(g.invert(a), g.transform(a, p)), p, atol=1e-10)
 
 
 @given(poses, vectors)
-def test_mirror_twice_is_nothing_and_mirrors_the_whole_scene(T, p):
+def test_mirroring_twice_is_the_identity_and_mirrors_the_whole_scene(T, p):
     np.testing.assert_array_equal(g.mirror_poses(g.mirror_poses(T)), T)
     mirrored = g.transform(g.mirror_poses(T), g.mirror_points(p))
     np.testing.assert_allclose(mirrored, g.mirror_points(g.transform(T, p)), atol=1e-10)

@@ -1,4 +1,4 @@
-"""What compiled functions work in, and that they neither allocate nor count references."""
+"""The working memory of compiled functions, which neither allocate nor count references."""
 
 import numpy as np
 from compiled import call

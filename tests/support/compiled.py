@@ -1,4 +1,4 @@
-"""A way for tests into functions that only kernels call."""
+"""Lets tests call functions that otherwise only kernels call."""
 
 from numba import njit
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
@@ -17,35 +18,49 @@ from manipnet.synthesis.model.shipped import shipped_hand
 
 
 def write_tiny_bundle(folder: Path, spread: float = 1e-3, hand: Hand | None = None) -> Path:
-    """Write a bundle of a hand, the shipped one by default, whose network is `tiny_network`."""
+    """Write a bundle of a hand, by default the shipped one, that answers with a half-closed hand."""
     hand = hand or shipped_hand()
-    content = tiny_network(hand, spread)
+    return write_bundle(folder, hand, tiny_network(hand, spread), hand.limits @ [0.7, 0.3])
+
+
+def write_still_bundle(folder: Path, angles: Array) -> Path:
+    """Write a bundle of the shipped hand that always answers with `angles (A,)`, far from any surface."""
+    hand = shipped_hand()
+    network = tiny_network(hand, spread=0.0, angles=angles, distance_m=1.0)
+    return write_bundle(folder, hand, network, np.zeros(hand.angle_count))
+
+
+def write_bundle(folder: Path, hand: Hand, network: bytes, rest_angles: Array) -> Path:
+    """Write a bundle of an ONNX graph and a hand."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "manipnet.onnx").write_bytes(content)
+    (folder / "manipnet.onnx").write_bytes(network)
     write_hand(hand, folder / HAND_FILE)
     meta = {
         "format": FORMAT,
         "layout": layout_of(hand).describe(),
         "angle_names": list(hand.angle_names),
-        "rest_angles_rad": (hand.limits @ [0.7, 0.3]).tolist(),
+        "rest_angles_rad": rest_angles.tolist(),
         "response": 0.5,
         "limits_rad": hand.limits.tolist(),
-        "model_sha256": hashlib.sha256(content).hexdigest(),
+        "model_sha256": hashlib.sha256(network).hexdigest(),
     }
     (folder / "bundle.json").write_text(json.dumps(meta))
     return folder
 
 
-def tiny_network(hand: Hand, spread: float = 1e-3) -> bytes:
-    """An ONNX graph: a random map of rank 4 around a half-closed hand 2 cm from everything; `spread` scales the map."""
+def tiny_network(hand: Hand, spread: float = 1e-3, angles: Array | None = None, distance_m: float = 0.02) -> bytes:
+    """An ONNX graph that answers with `angles`, by default half closed, `distance_m` from every surface.
+
+    To this it adds a random map of rank 4 of the features, which `spread` scales.
+    """
     onnx = pytest.importorskip("onnx", reason="onnx is not installed: python -m pip install onnx")
     helper, from_array = onnx.helper, onnx.numpy_helper.from_array
     layout, rng = layout_of(hand), np.random.default_rng(7)
-    positions, rotations = forward_kinematics(hand, hand.limits[None] @ [0.6, 0.4])
+    positions, rotations = forward_kinematics(hand, (hand.limits @ [0.6, 0.4] if angles is None else angles)[None])
     weights = {
         "narrow": rng.normal(size=(layout.input_size, 4)) / np.sqrt(layout.input_size),
         "wide": spread * rng.normal(size=(4, layout.output_size)),
-        "bias": pose_outputs(hand, positions, rotations, np.full((1, hand.joint_count), 0.02))[0],
+        "bias": pose_outputs(hand, positions, rotations, np.full((1, hand.joint_count), distance_m))[0],
     }
     graph = helper.make_graph(
         [

@@ -1,4 +1,4 @@
-"""Both hands on a turning object, written as formulas: for the golden outputs and the straightforward version."""
+"""A scene written as formulas, with both hands on a turning object, for tests that compare whole ticks."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene
 
 TICK_S = 0.1
-"""Longer than a real one, so that few ticks see a whole grasp."""
+"""Longer than a real tick, so that a few ticks see a whole grasp."""
 
 
 def scenes_at(tick: int, shapes: list[Shape]) -> list[HandScene]:
-    """Both hands close on a turning gourd; a third, without another wrist, passes a scaled one far away."""
+    """Both hands close on a turning object; a third hand, without another wrist, passes a scaled one at a distance."""
     instants = tick * TICK_S + WINDOW_OFFSETS_S
     thing = np.stack(
         [np.concatenate([[0.3 + 0.05 * t, 1.0, -0.2], quat_exp(np.array([0.2, t, 0.1]))]) for t in instants]
@@ -28,7 +28,7 @@ def scenes_at(tick: int, shapes: list[Shape]) -> list[HandScene]:
 
 
 def _beside(instants: Array, thing: Array, side: float) -> Array:
-    """A wrist that comes within a grasp of the thing and leaves again, its palm (-z) toward it; left for side -1."""
+    """A wrist that approaches the thing and leaves again, its palm (-z) toward it; a left one for side -1."""
     facing = quat_exp(np.array([0.0, np.pi if side > 0.0 else 0.0, 0.0]))
     poses = []
     for t, pose in zip(instants, thing, strict=True):

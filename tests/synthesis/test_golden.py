@@ -1,7 +1,7 @@
-"""A tick computes what it computed before: features and hands of a written scene, against stored ones.
+"""A tick computes what it computed before: features and hands of a written scene are compared with stored ones.
 
-A change of speed must leave this alone. A change of behaviour (sensors, solver) is stored anew, on purpose, with
-`PYTHONPATH=tests/support python tests/synthesis/test_golden.py`.
+A change for speed must leave these results alone. After an intended change of the sensors or the solver, store them
+again with `PYTHONPATH=tests/support python tests/synthesis/test_golden.py`.
 """
 
 import tempfile
@@ -64,7 +64,7 @@ def compute(bundle: Bundle, cache: Path, count: int = TICKS) -> dict[str, np.nda
 
 
 def _in_world(hand: Hand, scenes: list[HandScene], steps: list[HandStep]) -> dict[str, list[np.ndarray]]:
-    """What clients get of each hand, its size a little off."""
+    """What clients receive of each hand, of a size other than 1."""
     pairs: list[tuple[Side, ShownHand]] = [
         (scene.side, ShownHand("live", step.angles, scene.wrist[PRESENT], None))
         for scene, step in zip(scenes, steps, strict=True)
@@ -90,14 +90,14 @@ def stored() -> dict[str, np.ndarray]:
         return dict(data)
 
 
-def test_features_are_what_they_were(computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
+def test_features_are_unchanged(computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
     off = np.abs(computed["features"] - stored["features"]) > FEATURES_WITHIN
     rays = off[..., LAYOUT.input["proximity"].columns]
     assert rays.sum() <= STRAY_RAYS
     assert off.sum() == rays.sum(), f"columns {np.unique(np.argwhere(off)[:, -1])[:20]} differ"
 
 
-def test_the_scene_has_everything_in_it(stored: dict[str, np.ndarray]) -> None:
+def test_the_scene_exercises_every_sensor_and_the_solver(stored: dict[str, np.ndarray]) -> None:
     rays = stored["features"][..., LAYOUT.input["proximity"].columns]
     assert rays.min() < 0.0 < rays[rays > 0.0].min() < 0.01, "sensors inside, near and far"
     assert stored["features"][..., LAYOUT.input["ambient"].columns].mean() > 0.01
@@ -106,7 +106,7 @@ def test_the_scene_has_everything_in_it(stored: dict[str, np.ndarray]) -> None:
 
 
 @pytest.mark.parametrize("name", ["angles", "positions", "raw_positions", "distances", "joints", "local_rotations"])
-def test_hands_are_what_they_were(name: str, computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
+def test_hands_are_unchanged(name: str, computed: dict[str, np.ndarray], stored: dict[str, np.ndarray]) -> None:
     np.testing.assert_allclose(computed[name], stored[name], rtol=0.0, atol=POSES_WITHIN)
 
 

@@ -105,3 +105,45 @@ def rotation_vector_into(m: Array, out: Array):
     angle = np.arctan2(sine, 0.5 * (m[0, 0] + m[1, 1] + m[2, 2] - 1.0))
     factor = 1.0 if sine < 1e-9 else angle / sine
     out[0], out[1], out[2] = factor * x, factor * y, factor * z
+
+
+@inner
+def slerp_into(a: Array, b: Array, fraction, out: Array):
+    """Between unit quaternions of one hemisphere, a `fraction` of the way along the arc, into `out (4,)`."""
+    cosine = min(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3], 1.0)
+    angle = np.arccos(cosine)
+    sine = np.sin(angle)
+    from_a, from_b = 1.0 - fraction, fraction
+    if sine > 1e-6:
+        from_a, from_b = np.sin((1.0 - fraction) * angle) / sine, np.sin(fraction * angle) / sine
+    length = 0.0
+    for k in range(4):
+        out[k] = from_a * a[k] + from_b * b[k]
+        length += out[k] * out[k]
+    for k in range(4):
+        out[k] /= np.sqrt(length)
+
+
+@inner
+def rotation_vector_between_into(start: Array, end: Array, out: Array):
+    """The shortest rotation vector from the unit quaternion `start` to `end`, into `out (3,)`."""
+    w = end[0] * start[0] + end[1] * start[1] + end[2] * start[2] + end[3] * start[3]
+    x = end[0] * start[3] - end[3] * start[0] - end[1] * start[2] + end[2] * start[1]
+    y = end[1] * start[3] - end[3] * start[1] - end[2] * start[0] + end[0] * start[2]
+    z = end[2] * start[3] - end[3] * start[2] - end[0] * start[1] + end[1] * start[0]
+    sine = np.sqrt(x * x + y * y + z * z)
+    angle = 2.0 * np.arctan2(sine, abs(w))
+    gain = (2.0 if sine < 1e-9 else angle / sine) * (-1.0 if w < 0.0 else 1.0)
+    out[0], out[1], out[2] = gain * x, gain * y, gain * z
+
+
+@inner
+def turn_quat_into(turn: Array, q: Array, out: Array):
+    """The unit quaternion `q (4,)` turned further by the rotation vector `turn (3,)`, into `out (4,)`."""
+    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    gain = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
+    x, y, z, w = gain * turn[0], gain * turn[1], gain * turn[2], np.cos(0.5 * angle)
+    out[0] = w * q[0] + x * q[3] + y * q[2] - z * q[1]
+    out[1] = w * q[1] - x * q[2] + y * q[3] + z * q[0]
+    out[2] = w * q[2] + x * q[1] - y * q[0] + z * q[3]
+    out[3] = w * q[3] - x * q[0] - y * q[1] - z * q[2]

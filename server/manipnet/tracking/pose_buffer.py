@@ -7,6 +7,7 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel
+from manipnet.synthesis.rotations import slerp_into
 
 KEEP: Final = 1024
 """Number of newest samples that are kept: more than 2 s at the highest accepted rate."""
@@ -106,7 +107,7 @@ def sample(
 
 
 @inner
-def _count_before(times, t_s):
+def _count_before(times: Array, t_s: float):
     """Number of the rising `times` that are before an instant."""
     low, high = 0, len(times)
     while low < high:
@@ -119,7 +120,7 @@ def _count_before(times, t_s):
 
 
 @kernel
-def _resample(times, poses, at, present_s, until_s, out):
+def _resample(times: Array, poses: Array, at: Array, present_s: float, until_s: float, out: Array):
     """Write the poses at the rising instants `at`, interpolated between the rising `times`, into `out`.
 
     The poses stand at both ends. Returns the number of samples up to the first one at or after `until_s`, which are
@@ -140,22 +141,5 @@ def _resample(times, poses, at, present_s, until_s, out):
         fraction = (at[i] - times[before]) / (times[after] - times[before])
         for k in range(3):
             out[i, k] = poses[before, k] + fraction * (poses[after, k] - poses[before, k])
-        _slerp_into(poses[before, 3:], poses[after, 3:], fraction, out[i, 3:])
+        slerp_into(poses[before, 3:], poses[after, 3:], fraction, out[i, 3:])
     return known, age_s
-
-
-@inner
-def _slerp_into(a, b, fraction, out):
-    """Interpolate between unit quaternions of one hemisphere on the arc between them."""
-    cosine = min(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3], 1.0)
-    angle = np.arccos(cosine)
-    sine = np.sin(angle)
-    from_a, from_b = 1.0 - fraction, fraction
-    if sine > 1e-6:
-        from_a, from_b = np.sin((1.0 - fraction) * angle) / sine, np.sin(fraction * angle) / sine
-    length = 0.0
-    for k in range(4):
-        out[k] = from_a * a[k] + from_b * b[k]
-        length += out[k] * out[k]
-    for k in range(4):
-        out[k] /= np.sqrt(length)

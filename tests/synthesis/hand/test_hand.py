@@ -41,7 +41,7 @@ def test_every_shipped_bundle_has_the_same_hand() -> None:
     assert len(contents) == 1
 
 
-def test_the_layout_of_the_shipped_hand_is_the_papers() -> None:
+def test_the_layout_of_the_shipped_hand_is_that_of_the_paper() -> None:
     layout = layout_of(HAND)
     assert (layout.input_size, layout.output_size) == (2356, 220)
     assert layout.describe()["input"][7:] == [
@@ -73,7 +73,7 @@ def test_compiled_code_unpacks_what_was_packed(hand: Hand) -> None:
             np.testing.assert_array_equal(ours, theirs)
 
 
-def test_nobody_changes_a_hand_that_was_read() -> None:
+def test_a_hand_that_was_read_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         HAND.offsets[1, 0] = 0.5
 

@@ -48,7 +48,7 @@ def axes(joints: Array, *names: str) -> tuple[Array, Array]:
     return quat_rotate(q, np.array([[0.0, 0.0, -1.0]])), quat_rotate(q, np.array([[0.0, 1.0, 0.0]]))
 
 
-def test_names_are_openxrs_in_openxrs_order():
+def test_joint_names_are_those_of_openxr_in_its_order():
     assert len(OPENXR_JOINT_NAMES) == len(set(OPENXR_JOINT_NAMES)) == 26
     assert OPENXR_JOINT_NAMES[:8] == (
         *("palm", "wrist", "thumb_metacarpal", "thumb_proximal", "thumb_distal", "thumb_tip"),
@@ -57,7 +57,7 @@ def test_names_are_openxrs_in_openxrs_order():
     assert OPENXR_JOINT_NAMES[-2:] == ("little_distal", "little_tip")
 
 
-def test_webxr_names_are_the_specifications():
+def test_webxr_names_are_those_of_the_specification():
     assert len(WEBXR_JOINT_NAMES) == 25
     assert WEBXR_JOINT_NAMES[:7] == (
         *("wrist", "thumb-metacarpal", "thumb-phalanx-proximal", "thumb-phalanx-distal", "thumb-tip"),

@@ -1,4 +1,4 @@
-"""The hand's own skin: one closed surface per hand, that follows its bones, with its sensors on the palm side."""
+"""The skin of the shipped hand: one closed surface that follows its bones, with sensors on the palm side."""
 
 import numpy as np
 import pytest

@@ -149,18 +149,18 @@ def test_what_moves_in_one_hand_while_the_other_is_far_is_held():
     assert call(grasp_confidence, STILL, STILL, far) == 0.0
 
 
-def test_a_grip_is_the_thumb_and_the_nearest_fingers():
-    distances, grip = np.full(22, 0.05), np.empty(5)
+def test_the_thumb_and_the_nearest_fingers_take_part_in_a_grasp():
+    distances, confidences = np.full(22, 0.05), np.empty(5)
     distances[5:8] = distances[18] = 0.012  # the index finger
     distances[8:11] = distances[19] = 0.016
-    call(finger_confidences_into, HAND.chains, distances, 0.8, grip)
-    assert grip[0] == grip[1] == pytest.approx(0.8)
-    assert 0.0 < grip[2] < 0.8
-    assert np.all(grip[3:] == 0.0)
+    call(finger_confidences_into, HAND.chains, distances, 0.8, confidences)
+    assert confidences[0] == confidences[1] == pytest.approx(0.8)
+    assert 0.0 < confidences[2] < 0.8
+    assert np.all(confidences[3:] == 0.0)
 
 
 def test_a_hand_that_holds_closes_on_the_object(ball):
-    """Fingers that no prediction says touch come onto the surface once the hand holds."""
+    """Fingers without a predicted contact come onto the surface when the hand holds the object."""
     start = np.tile([0.1, 0.0, 0.1, 0.1], 5)
     positions, _ = forward_kinematics(HAND, start)
     center = positions[19] + np.array([0.0, 0.0, -0.03 - 0.02])
@@ -175,8 +175,8 @@ def test_a_hand_that_holds_closes_on_the_object(ball):
     assert -0.008 < gaps[1] < 0.002
 
 
-def test_a_finger_that_went_through_comes_out_on_the_side_it_came_from(ball):
-    """From beyond the middle of the ball the nearest way out is the far side, through which no finger gets."""
+def test_a_finger_deep_in_the_object_comes_out_on_the_side_it_entered(ball):
+    """Beyond the middle of the ball the nearest surface is the far side, but a finger cannot pass through the ball."""
     predicted = np.zeros(20)
     predicted[9:12] = 0.5
     targets, _ = forward_kinematics(HAND, predicted)

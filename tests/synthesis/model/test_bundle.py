@@ -1,4 +1,4 @@
-"""Where a network runs: a GPU that cannot be had costs a line of the log and nothing else."""
+"""Bundles: where the network runs, and bundles that are refused with the reason."""
 
 import logging
 import shutil
@@ -22,7 +22,7 @@ HAS_CUDA = "CUDAExecutionProvider" in onnxruntime.get_available_providers()
 
 
 @pytest.mark.skipif(HAS_CUDA, reason="this machine's ONNX Runtime has CUDA")
-def test_without_cuda_the_processor_does_it_and_a_line_says_why(tiny_bundle: Path, caplog) -> None:
+def test_without_cuda_the_processor_is_used_and_the_log_says_why(tiny_bundle: Path, caplog) -> None:
     rows = np.random.default_rng(0).normal(size=(3, LAYOUT.input_size)).astype(np.float32)
     wanted = load_bundle(tiny_bundle, "cpu").infer(rows)
     with caplog.at_level(logging.WARNING):
@@ -33,7 +33,7 @@ def test_without_cuda_the_processor_does_it_and_a_line_says_why(tiny_bundle: Pat
     np.testing.assert_array_equal(bundle.infer(rows), wanted)
 
 
-def test_nobody_who_asked_for_nothing_is_told_of_gpus(tiny_bundle: Path, caplog) -> None:
+def test_the_log_is_silent_unless_a_gpu_was_requested(tiny_bundle: Path, caplog) -> None:
     with caplog.at_level(logging.WARNING):
         assert load_bundle(tiny_bundle, "auto").provider in ("cpu", "cuda")
         assert load_bundle(tiny_bundle, "cpu").provider == "cpu"

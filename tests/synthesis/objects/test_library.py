@@ -1,4 +1,4 @@
-"""The library of objects: closed, turned outward, as large as the formulas say, and what the generator makes."""
+"""The library of objects: closed meshes of the right size, equal to what their generator makes."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def test_shape_is_closed_and_fits_a_hand(name: str):
 
 
 @pytest.mark.parametrize("name", VOLUMES_CM3)
-def test_volume_is_the_formulas(name: str):
+def test_the_volume_agrees_with_the_formula(name: str):
     tolerance = 1e-5 if name in FLAT_SIDED else 0.012  # chords lie inside the curve
     assert surface(name).volume == pytest.approx(VOLUMES_CM3[name] * CM3, rel=tolerance)
 
@@ -71,12 +71,12 @@ def test_mug_is_hollow_and_has_a_handle_to_reach_through(mug: Shape):
     assert np.isinf(through[0])
 
 
-def test_scale_is_of_the_whole_object():
+def test_the_scale_resizes_the_whole_object():
     assert np.allclose(load_library_mesh("cube", scale=2.0).vertices, 2.0 * load_library_mesh("cube").vertices)
 
 
-def test_unknown_name_says_what_there_is():
-    with pytest.raises(MeshError, match="no object 'spoon' in the library; it has bottle, bowl"):
+def test_an_unknown_name_is_refused_with_the_list():
+    with pytest.raises(MeshError, match="the library has no object 'spoon'; it has bottle, bowl"):
         load_library_mesh("spoon")
 
 

@@ -69,14 +69,14 @@ def test_points_on_the_surface_have_a_normal(box):
     assert np.all(np.sum(normal * corners, axis=1) > 0.0)
 
 
-def test_rays_hit_a_sphere_where_the_formula_says(sphere, points):
+def test_rays_hit_a_sphere_at_the_computed_distance(sphere, points):
     outside = points[np.linalg.norm(points, axis=1) > RADIUS * 1.1]
     aim = -outside / np.linalg.norm(outside, axis=1, keepdims=True)
     np.testing.assert_allclose(sphere.trace(outside, aim), np.linalg.norm(outside, axis=1) - RADIUS, atol=1e-4)
     assert np.all(np.isinf(sphere.trace(outside, -aim)))
 
 
-def test_rays_from_inside_say_so(box):
+def test_rays_report_that_they_start_inside(box):
     origins = np.zeros((3, 3))
     distance, inside = box.rays.trace(origins, np.eye(3))
     np.testing.assert_allclose(distance, HALF, atol=1e-6)
@@ -128,7 +128,7 @@ def test_independent_values(manipnet_data, take):
     np.testing.assert_allclose(shape.volume_m3, checks[f"{take}/volume"], rtol=1e-6)
 
 
-def test_the_demos_shapes_are_built_ahead(tmp_path):
+def test_the_shapes_of_the_demo_are_prebuilt(tmp_path):
     for name in DEMO_OBJECTS:
         mesh = load_library_mesh(name)
         assert (PREBUILT_FOLDER / cache_name(mesh)).is_file(), "run python -m manipnet_tools.assets.prebuilt_shapes"

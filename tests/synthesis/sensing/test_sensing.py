@@ -125,7 +125,7 @@ def slow_features(shape, distance_of, windows, positions, rotations, n):
     return row
 
 
-def test_sizes_are_the_papers():
+def test_sizes_are_those_of_the_paper():
     assert (LAYOUT.input_size, LAYOUT.output_size) == (2356, 220)
 
 

@@ -1,4 +1,4 @@
-"""The generated performance: it is the one shipped, it loops, nothing falls through the table or flies."""
+"""The generated scene of the demo: it is the one shipped, it loops, and its motion is plausible."""
 
 import numpy as np
 
@@ -18,12 +18,12 @@ def test_the_shipped_recording_is_the_generated_one():
         np.testing.assert_allclose(along, 1.0, atol=1e-5)
 
 
-def test_it_ends_as_it_began():
+def test_the_scene_ends_as_it_began():
     for track in TAKE.bodies.values():
         np.testing.assert_allclose(track.poses[-1, :3], track.poses[0, :3], atol=0.005)
 
 
-def test_speeds_are_a_persons():
+def test_speeds_are_those_of_a_person():
     for track in TAKE.bodies.values():
         speed = np.linalg.norm(np.diff(track.poses[:, :3], axis=0), axis=1) * TAKE.rate_hz
         assert speed.max() < 1.5

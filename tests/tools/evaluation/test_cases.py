@@ -1,4 +1,4 @@
-"""The measures on real takes: what the captured fingers are known to reach."""
+"""The measures on real takes, for which the scores of the captured fingers are known."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def captured(cases):
     return {name: score(case, np.zeros((22, 3)), case.captured) for name, case in cases.items()}
 
 
-def test_captured_fingers_are_perfect_by_the_measures_that_compare_with_them(captured):
+def test_captured_fingers_score_perfectly_on_comparisons_with_themselves(captured):
     for sides in captured.values():
         for one in sides.values():
             assert one.ratio == one.mpjpe_mm == one.tip_mm == one.drift_s == 0.0
@@ -36,7 +36,7 @@ def test_captured_smoothness_of_the_cylinder(cases):
     assert smoothness == pytest.approx([127, 117], rel=0.02)
 
 
-def test_parts_keep_what_comes_from_the_whole_take(cases):
+def test_parts_keep_the_values_derived_from_the_whole_take(cases):
     case = cases["mug1"]
     part = case.part(0.8, 1.0)
     start = len(case) - len(part)
@@ -46,13 +46,13 @@ def test_parts_keep_what_comes_from_the_whole_take(cases):
     np.testing.assert_array_equal(part.gaps["left"].gap, case.gaps["left"].gap[start:])
 
 
-def test_the_synthesis_gets_no_fingers(cases):
+def test_the_synthesis_receives_no_captured_fingers(cases):
     for seen in cases["mug1"].inputs.values():
         arrays = [value for value in vars(seen).values() if isinstance(value, np.ndarray)]
         assert [array.shape[1:] for array in arrays] == [(21, 7)] * 3 + [()]  # three bodies, which object
 
 
-def test_a_folder_that_is_not_the_dataset(tmp_path, manipnet_data):
+def test_a_folder_that_is_not_the_dataset_is_refused(tmp_path, manipnet_data):
     with pytest.raises(DataError, match="holds no takes; expected are folders BVH"):
         load_cases(tmp_path)
     with pytest.raises(DataError, match="has no take spoon9; it has"):

@@ -33,7 +33,7 @@ def test_every_row_covers_every_case(results):
         assert set(row.scores["mug1"]) == {"left", "right"}
 
 
-def test_rows_are_what_they_are_called(results):
+def test_rows_hold_what_their_names_say(results):
     assert results.rows[MEAN].average.ratio == pytest.approx(1.0)
     assert results.rows[HOLD].average.smoothness == 0.0
     np.testing.assert_array_equal(
@@ -71,7 +71,7 @@ def test_folds_keep_test_frames_out_of_training(cases):
     assert [(fold.name, [case.name for case in fold.train]) for fold in unseen] == [("mug1", ["cyl_med3"])]
 
 
-def test_a_sweep_is_drawn(results, tmp_path):
+def test_a_sweep_is_plotted(results, tmp_path):
     pytest.importorskip("matplotlib")
     from manipnet_tools.evaluation import plots
 

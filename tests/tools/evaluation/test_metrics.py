@@ -47,7 +47,7 @@ def test_a_capsule_four_millimetres_deep():
     assert metrics.deeper_share(gaps, 0.0039) == pytest.approx(2 / 19)
 
 
-def test_deep_frames_and_shares_count_what_they_say():
+def test_deep_frames_and_shares_are_counted():
     depth = HAND.radii[18] - np.array([0.0, 0.011, 0.016, 0.02])
     gaps = gaps_of(np.concatenate([hand_with_pinky_at(height) for height in depth]))
     assert metrics.deep_frames(gaps) == 0.5
@@ -79,7 +79,7 @@ def test_contact_f1_counted_by_hand():
     assert np.isnan(metrics.contact_f1(bare_gaps([[1.0]]), bare_gaps([[1.0]])))
 
 
-def test_near_and_idle_go_by_the_closest_capsule():
+def test_near_and_idle_depend_on_the_closest_capsule():
     gaps = bare_gaps([[0.5, 0.02], [0.5, 0.1], [0.5, 0.2]])
     assert metrics.near(gaps).tolist() == [True, False, False]
     assert metrics.idle(gaps).tolist() == [False, False, True]
@@ -116,7 +116,7 @@ def test_longest_drift():
     assert metrics.longest_drift_s(np.zeros(5)) == 0.0
 
 
-def test_only_fingertips_that_touch_in_two_frames_on_end_slide():
+def test_only_fingertips_that_touch_in_two_successive_frames_slide():
     tip = HAND.radii[18]
     positions = hand_with_pinky_at(tip, frames=4)
     positions[:, 21, 0] = [0.0, 0.001, 0.003, 0.003]

@@ -48,7 +48,7 @@ def test_free_fall_needs_no_contact():
 
 
 @pytest.mark.parametrize("flip", [False, True])
-def test_steady_spin_off_a_principal_axis_needs_eulers_torque(flip):
+def test_a_steady_spin_off_a_principal_axis_needs_a_torque(flip):
     spin = np.array([0.8, 0.6, 0.4])
     q = geometry.quat_exp(spin * TIME[:, None])
     if flip:
@@ -79,7 +79,7 @@ def test_a_sphere_held_by_points(directions, held):
         assert residual[0] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_two_hands_hold_together_what_one_cannot():
+def test_two_hands_hold_what_one_cannot():
     wrench = physics.wrench_needed(poses(np.zeros((30, 3))), SPHERE)[:1]
     left, right = touching((1, 0, 0)), touching((-1, 0, 0))
     assert physics.residuals([left, right], wrench, SPHERE)[0] == pytest.approx(0.0, abs=1e-9)
@@ -87,7 +87,7 @@ def test_two_hands_hold_together_what_one_cannot():
     assert physics.residuals([left, away], wrench, SPHERE)[0] > physics.RULE.tolerance_m_s2
 
 
-def test_the_papers_rule_wants_overlap():
+def test_the_rule_of_the_paper_requires_overlap():
     wrench = physics.wrench_needed(poses(np.zeros((30, 3))), SPHERE, physics.PAPER)[:1]
     grip = touching((1, 0, 0), (-1, 0, 0))
     apart = metrics.Gaps(grip.gap + 0.001, grip.point, grip.normal)
@@ -101,7 +101,7 @@ def test_the_papers_rule_wants_overlap():
     assert share == [0.0, 1.0]
 
 
-def test_lifted_goes_by_the_lowest_point():
+def test_lifted_depends_on_the_lowest_point():
     p = np.zeros((3, 3))
     p[:, 1] = [RADIUS, RADIUS + 0.019, RADIUS + 0.021]
     assert physics.lifted(poses(p), SPHERE).tolist() == [False, False, True]

@@ -1,4 +1,4 @@
-"""Averages, targets and their report."""
+"""Averages of scores, and targets."""
 
 from dataclasses import fields
 
@@ -12,7 +12,7 @@ def score(**measures: float) -> Score:
     return Score(**{field.name: 0.5 for field in fields(Score)} | measures)
 
 
-def test_the_average_leaves_out_what_a_case_does_not_have():
+def test_the_average_leaves_out_measures_that_a_case_lacks():
     mean = average([score(ratio=0.4, drift_s=1.0), score(ratio=0.6, drift_s=3.0), score(ratio=np.nan)])
     assert mean.ratio == pytest.approx(0.5)
     assert mean.drift_s == 3.0

@@ -1,4 +1,4 @@
-"""Sweeps: what is changed about the input."""
+"""Sweeps: how they change the input."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from manipnet_tools.evaluation.sweeps import forwards_and_backwards
 from manipnet_tools.takes.rollout import HandInput
 
 
-def test_an_input_played_forwards_and_backwards_has_its_windows_turned_on_the_way_back():
+def test_the_windows_of_an_input_played_backwards_are_reversed():
     windows = np.arange(3 * 21 * 7, dtype=np.float64).reshape(3, 21, 7)
     seen = HandInput("right", windows, windows + 1.0, windows + 2.0, (), np.array([4, 5, 6]))
     played = forwards_and_backwards(seen, np.array([0, 1, 2, 2, 1]), np.array([True, True, True, False, False]))

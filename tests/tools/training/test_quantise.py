@@ -1,5 +1,5 @@
 # ruff: noqa: E402
-"""Quantised weights: what they may cost in answers."""
+"""Quantised weights change the answers only a little."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_wide_layers_answer_nearly_the_same_in_4_bits(graph: bytes, monkeypatch:
     assert wrong[1024] < wrong[128] < 0.2
 
 
-def test_one_large_input_does_not_make_the_others_coarse(graph: bytes) -> None:
+def test_one_large_input_does_not_coarsen_the_others(graph: bytes) -> None:
     rows = np.random.default_rng(0).normal(size=(8, LAYOUT.input_size)).astype(np.float32)
     rows[:, 1000] = 60.0
     exact, quantised = _answers(graph, rows), _answers(compress.quantise_weights(graph), rows)
@@ -47,7 +47,7 @@ def test_one_large_input_does_not_make_the_others_coarse(graph: bytes) -> None:
 
 
 @pytest.mark.parametrize("wide", [1024, 128])
-def test_weights_are_where_they_were_to_one_level(graph: bytes, wide: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_weights_change_by_at_most_one_level(graph: bytes, wide: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compress, "_WIDE", wide)
     model = onnx.load_from_string(compress.quantise_weights(graph))
     stored = {tensor.name: onnx.numpy_helper.to_array(tensor) for tensor in model.graph.initializer}
@@ -64,7 +64,7 @@ def test_weights_are_where_they_were_to_one_level(graph: bytes, wide: int, monke
         assert np.all(again[:, exact.shape[1] :] == 0.0)
 
 
-def test_what_it_cannot_quantise_is_refused(graph: bytes) -> None:
+def test_a_graph_that_cannot_be_quantised_is_refused(graph: bytes) -> None:
     model = onnx.load_from_string(graph)
     gemm = next(node for node in model.graph.node if node.op_type == "Gemm")
     gemm.attribute.append(onnx.helper.make_attribute("alpha", 2.0))

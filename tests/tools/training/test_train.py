@@ -1,5 +1,5 @@
 # ruff: noqa: E402
-"""Training: what is learned from, that it is learned, and bundles that come out whole."""
+"""Training: which frames are used, that a model learns, and bundles that can be loaded."""
 
 import json
 from dataclasses import replace
@@ -66,7 +66,7 @@ def test_a_take_played_backwards_twice_is_itself(hands):
 
 
 def test_frames_behind_the_share_are_never_learned_from(hands):
-    """Samples are the same whatever the unseen rest of a take looks like."""
+    """The samples do not depend on the rest of a take."""
     share = 0.6
     last = int(FRAMES * share)
     torn = [replace(captured, angles=captured.angles.copy(), wrist=captured.wrist.copy()) for captured in hands]
@@ -97,7 +97,7 @@ def test_training_is_the_same_for_the_same_seed(hands, learned):
     assert not torch.equal(weights, others)
 
 
-def test_a_bundle_answers_like_its_model_and_tells_its_origin(learned, tmp_path):
+def test_a_bundle_answers_like_its_model_and_names_its_takes(learned, tmp_path):
     save_bundle(learned, tmp_path / "mine")
     bundle = load_bundle(tmp_path / "mine")
     rows = np.random.default_rng(0).normal(0.0, 0.1, (3, LAYOUT.input_size)).astype(np.float32)

@@ -1,5 +1,7 @@
-"""Pictures of docs/calibration.md and of the page, and the printable sheet:
-`python -m manipnet_tools.assets.calibration_pictures`."""
+"""Draw the pictures of docs/calibration.md and of the page, and the printable sheet.
+
+Run `python -m manipnet_tools.assets.calibration_pictures`.
+"""
 
 from pathlib import Path
 from typing import Any, Final

@@ -1,6 +1,6 @@
-"""A scripted scene for two hands and some objects, turned into tracks: who grasps what, how, and where it goes.
+"""Turns the script of a scene into tracks: which hand grasps which object, how, and where the object goes.
 
-Hands are directed as right hands: a left hand is given the mirror image (through x = 0) of what is said in the world.
+Hands are scripted as right hands; a left hand makes the mirror image (through x = 0) of the scripted poses.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,16 +26,16 @@ from manipnet_tools.assets.minimum_jerk import Move, ease, superpose, tremor
 Vector = tuple[float, float, float]
 
 GRIP_CENTRE_M: Vector = (0.125, 0.010, -0.058)
-"""Where people have the middle of what they hold, in the wrist frame: measured on captured grasps."""
+"""Centre of a held object in the wrist frame, as measured on captured grasps."""
 CLEARANCE_M: Vector = (-0.045, 0.0, 0.055)
-"""How a hand stands off an object, in its wrist frame, before it closes and after it opens."""
+"""Position of a hand relative to its grasp, in its wrist frame, before it closes and after it opens."""
 SETTLE_S = 0.3
-"""An object takes up the tremor of the hand that lifts it within this time."""
+"""Within this time an object takes up the tremor of the hand that lifts it."""
 
 
 @dataclass(frozen=True)
 class Rest:
-    """The hand stays at a place in the world, `wrist (7,)`."""
+    """The hand stays at one pose in the world, `wrist (7,)`."""
 
     start_s: float
     end_s: float
@@ -44,7 +44,7 @@ class Rest:
 
 @dataclass(frozen=True)
 class Grasp:
-    """The hand is on a body, fixed to it; `fingers` and `palm` are world directions when the grasp begins."""
+    """The hand is fixed to a body; `fingers` and `palm` are world directions at the beginning of the grasp."""
 
     start_s: float
     end_s: float
@@ -52,13 +52,13 @@ class Grasp:
     fingers: Vector
     palm: Vector
     at: Vector = (0.0, 0.0, 0.0)
-    """The point that is held, from the body's origin along the world's axes."""
+    """The held point, relative to the body's origin along the world's axes."""
     centre: Vector = GRIP_CENTRE_M
-    """Where the held point is in the wrist frame."""
+    """The held point in the wrist frame."""
 
 
 def hand_pose(fingers: Vector, palm: Vector, p_world: Vector | Array, p_wrist: Vector = (0.0, 0.0, 0.0)) -> Array:
-    """A right wrist `(7,)` whose fingers and palm face two directions, with its point `p_wrist` at `p_world`."""
+    """Pose `(7,)` of a right wrist whose fingers and palm face two directions; its point `p_wrist` is at `p_world`."""
     x = np.array(fingers) / np.linalg.norm(fingers)
     z = x * (np.array(palm) @ x) - np.array(palm)
     z /= np.linalg.norm(z)
@@ -67,7 +67,7 @@ def hand_pose(fingers: Vector, palm: Vector, p_world: Vector | Array, p_wrist: V
 
 
 def object_pose(position: Vector, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> Array:
-    """A pose `(7,)`: turned about Y, then leaned about the world's X, then Z; degrees."""
+    """A pose `(7,)` turned about Y, then about the world's X, then about Z; angles in degrees."""
     about_y, about_x, about_z = (
         quat_exp(np.radians(angle) * np.eye(3)[axis]) for angle, axis in ((yaw, 1), (pitch, 0), (roll, 2))
     )
@@ -80,7 +80,7 @@ def perform(
     moves: Mapping[str, Sequence[Move]],
     hands: Mapping[Side, Sequence[Rest | Grasp]],
 ) -> dict[str, Array]:
-    """World poses `(T, 7)` of both wrists and every body; `homes (7,)` are where the bodies start."""
+    """World poses `(T, 7)` of both wrists and every body; the bodies start at `homes (7,)`."""
     period_s = float(time_s[-1] + time_s[1] - 2.0 * time_s[0])
     tracks = {name: superpose(time_s, home, moves.get(name, ())) for name, home in homes.items()}
     shakes = {side: tremor(time_s, period_s, salt) for salt, side in enumerate(SIDES)}
@@ -96,7 +96,7 @@ def perform(
 
 
 def _wrist(time_s: Array, side: Side, script: Sequence[Rest | Grasp], tracks: Mapping[str, Array]) -> Array:
-    """Wrist poses `(T, 7)`: fixed to what it is on, and reaching from one to the next in between."""
+    """Wrist poses `(T, 7)`: fixed to a place or body, and reaching from one to the next in between."""
     poses = np.empty((len(time_s), 7))
     held = [_fixed(time_s, side, part, tracks) for part in script]
     for part, track in zip(script, held, strict=True):
@@ -112,7 +112,7 @@ def _wrist(time_s: Array, side: Side, script: Sequence[Rest | Grasp], tracks: Ma
 
 
 def _reach(side: Side, a: Rest | Grasp, b: Rest | Grasp, start: Array, goal: Array) -> list[Move]:
-    """From one place to the next: off what is held, across, and onto what is to be held, without a stop."""
+    """The moves from one place to the next without a stop: away from the held object, across, and onto the next one."""
     clear = np.array([*CLEARANCE_M, 0.0, 0.0, 0.0, 1.0])
     if side == "left":
         clear = mirror_poses(clear)
@@ -129,7 +129,7 @@ def _reach(side: Side, a: Rest | Grasp, b: Rest | Grasp, start: Array, goal: Arr
 
 
 def _fixed(time_s: Array, side: Side, part: Rest | Grasp, tracks: Mapping[str, Array]) -> Array:
-    """Wrist poses `(T, 7)` as if the hand were there all the time."""
+    """Wrist poses `(T, 7)` as if the hand were at this part of the script all the time."""
     if isinstance(part, Rest):
         wrist = part.wrist if side == "right" else mirror_poses(part.wrist)
         return np.tile(wrist, (len(time_s), 1))
@@ -144,7 +144,7 @@ def _fixed(time_s: Array, side: Side, part: Rest | Grasp, tracks: Mapping[str, A
 
 
 def _carried(time_s: Array, name: str, script: Sequence[Rest | Grasp], moves: Sequence[Move]) -> Array:
-    """How much a hand's tremor is the body's, `(T,)` in 0 to 1: while it holds the body off the table."""
+    """Share `(T,)`, 0 to 1, of a hand's tremor that the body has: while the hand holds it off the table."""
     share = np.zeros(len(time_s))
     for part in script:
         if isinstance(part, Grasp) and part.body == name:

@@ -1,9 +1,8 @@
-"""Generate the demo recording: `python -m manipnet_tools.assets.demo_recording` rewrites the performance the server
-ships.
+"""Generate the demo recording that the server plays: `python -m manipnet_tools.assets.demo_recording`.
 
-Two hands at a table (y = 0) reach for a cube, a cylinder and a mug of the library, lift and turn them, hand them over
-and put them back, and end as they began. Every pose is made here; how a hand stands to what it holds, how high it
-rests and how fast it moves were measured on captured takes.
+Two hands at a table (y = 0) reach for a cube, a cylinder and a mug of the library, lift and turn them, hand them over,
+put them back, and end where they began. Every pose is made here; the pose of a hand relative to a held object, the
+height at which it rests and its speed were measured on captured takes.
 """
 
 from collections.abc import Iterator
@@ -90,7 +89,7 @@ HANDS: dict[Side, list[Rest | Grasp]] = {
 
 
 def demo_take() -> Take:
-    """The performance, at 120 Hz; its last frame is followed by its first."""
+    """The scene at 120 Hz; its first frame can follow its last one."""
     time_s = np.arange(round(LENGTH_S * RATE_HZ)) / RATE_HZ
     seen = np.ones(len(time_s), dtype=np.bool_)
     tracks = perform(time_s, HOMES, MOVES, HANDS)
@@ -98,7 +97,7 @@ def demo_take() -> Take:
 
 
 def demo_frames() -> Iterator[BodyFrame]:
-    """The performance as a tracker would stream it, rounded to a hundredth of a millimetre."""
+    """The scene as a tracker would stream it, rounded to a hundredth of a millimetre."""
     take = demo_take()
     for k, t_s in enumerate(take.time_s):
         bodies = tuple(
@@ -115,7 +114,7 @@ def demo_frames() -> Iterator[BodyFrame]:
 
 
 def main() -> None:
-    """Write the recording into the package, over the one that is there."""
+    """Replace the recording in the package."""
     DEMO_FILE.unlink(missing_ok=True)
     with RecordingWriter(DEMO_FILE, {}) as writer:
         for frame in demo_frames():

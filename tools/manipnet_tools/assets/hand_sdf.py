@@ -1,9 +1,9 @@
-"""The shape of the hand as a signed distance: tapered capsules around the bones, melted into a palm and a thumb web.
+"""The shape of the hand as a signed distance: tapered capsules around the bones, blended into a palm and a thumb web.
 
-Everything is in the wrist frame of a right hand in the bind pose, metres. The fingers melt into the palm but not into
-one another. Radii follow the capsules of the dataset's subject where objects are touched; the tips are slimmer than
-their capsules and hang back behind the tip joint, because on captured grasps the tip joints lie on the pads, not inside
-the finger.
+Everything is in the wrist frame of a right hand in the bind pose, metres. The fingers are blended into the palm but not
+into one another. Radii follow the capsules of the dataset's subject where objects are touched. The tips are slimmer
+than their capsules and lie behind the tip joints, because on captured grasps the tip joints lie on the pads and not
+inside the finger.
 """
 
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
 
-_MELT_PALM_M = 2.5e-3
-_MELT_FINGER_M = 0.8e-3
+_BLEND_PALM_M = 2.5e-3
+_BLEND_FINGER_M = 0.8e-3
 
 _FINGER_RADII_MM = (
     # at each joint from the root to the tip
@@ -25,7 +25,7 @@ _FINGER_RADII_MM = (
     (9.6, 8.3, 7.4, 5.4),
 )
 _TIP_BACK_MM = (4.5, 3.6, 3.0, 3.0, 3.4)
-"""How far the centre of a fingertip lies behind its tip joint, toward the back of the hand."""
+"""Distance from the tip joint to the centre of a fingertip, toward the back of the hand."""
 
 # start xyz, end xyz, radii, in millimetres: flesh of the palm that no single bone carries
 _WRIST_FLESH = (
@@ -40,7 +40,7 @@ _WEB_FLESH = (((52, 29, -19), (90, 25, -6), 12, 8.5),)
 
 @dataclass(frozen=True)
 class Cone:
-    """A tapered capsule: spheres of radius `ra` at `a` and `rb` at `b` and the hull of both. Belongs to `bone`."""
+    """A tapered capsule of a `bone`: the hull of a sphere of radius `ra` at `a` and one of radius `rb` at `b`."""
 
     bone: int
     a: Array
@@ -49,7 +49,7 @@ class Cone:
     rb: float
 
     def distance(self, points: Array) -> Array:
-        """Signed distance at points `(n, 3)`; exact (after Quilez, "Round cone")."""
+        """Exact signed distance at points `(n, 3)`. Source: Quilez, "Round cone"."""
         axis = self.b - self.a
         length2 = axis @ axis
         taper = self.ra - self.rb
@@ -71,7 +71,7 @@ class Cone:
 
 @dataclass(frozen=True)
 class HandShape:
-    """Cones of the palm with the thenar, and of each finger."""
+    """The cones of the palm, with the thenar, and of each finger."""
 
     palm: tuple[Cone, ...]
     fingers: tuple[tuple[Cone, ...], ...]
@@ -79,11 +79,11 @@ class HandShape:
     def distance(self, points: Array) -> Array:
         """Signed distance of the whole hand at points `(n, 3)`."""
         palm = [cone.distance(points) for cone in self.palm]
-        chains = [_melt([c.distance(points) for c in chain], _MELT_FINGER_M) for chain in self.fingers]
-        return np.min([_melt([*palm, chain], _MELT_PALM_M) for chain in chains], axis=0)
+        chains = [_smooth_minimum([c.distance(points) for c in chain], _BLEND_FINGER_M) for chain in self.fingers]
+        return np.min([_smooth_minimum([*palm, chain], _BLEND_PALM_M) for chain in chains], axis=0)
 
     def bone_distances(self, points: Array) -> Array:
-        """Signed distance to the flesh of each bone, `(n, 17)`; bone 1 has none of its own and shares bone 2's."""
+        """Signed distance to the flesh of each bone, `(n, 17)`; infinite for bone 1, which has no flesh of its own."""
         cones = [*self.palm, *(cone for chain in self.fingers for cone in chain)]
         distances = np.full((len(points), 17), np.inf)
         for cone in cones:
@@ -133,7 +133,7 @@ def _cone_mm(bone: int, a: tuple, b: tuple, ra: float, rb: float) -> Cone:
     return Cone(bone, 1e-3 * np.array(a, dtype=float), 1e-3 * np.array(b, dtype=float), 1e-3 * ra, 1e-3 * rb)
 
 
-def _melt(distances: list[Array], width: float) -> Array:
+def _smooth_minimum(distances: list[Array], width: float) -> Array:
     """Smooth minimum of `(n,)` arrays over about `width` metres."""
     stack = np.stack(distances)
     low = stack.min(axis=0)

@@ -24,7 +24,7 @@ BONES_PER_VERTEX = 4
 SENSOR_COUNT = 104
 SENSOR_BONES = 2
 PALMAR_COSINE = 0.45
-"""A vertex belongs to the palm side if its normal is within about 63 degrees of where flexion takes its bone."""
+"""A vertex belongs to the palm side if its normal is within about 63 degrees of the direction of its bone's flexion."""
 
 
 def with_surface(hand: Hand) -> Hand:
@@ -54,9 +54,9 @@ def with_surface(hand: Hand) -> Hand:
 
 
 def skin_weights(hand: Hand, shape: HandShape, vertices: Array, faces: NDArray) -> Array:
-    """Weights `(V, B)` that sum to one: nearness to each bone's flesh, smoothed along the skin.
+    """Weights `(V, B)` that sum to one, by the distance to each bone's flesh, smoothed along the skin.
 
-    A bone shares only with its parent and children, so that fingers never drag their neighbours along.
+    A bone shares vertices only with its parent and children, so that fingers never drag their neighbours along.
     """
     distance = shape.bone_distances(vertices)
     main = distance.argmin(axis=1)
@@ -72,7 +72,7 @@ def skin_weights(hand: Hand, shape: HandShape, vertices: Array, faces: NDArray) 
 
 
 def choose_sensors(vertices: Array, normals: Array, weights: Array, palmar: Array, joints: Array) -> NDArray[np.int64]:
-    """Vertices of the palm side, spread evenly by farthest-point sampling from the middle of the palm on."""
+    """Indices of vertices of the palm side, spread evenly by farthest-point sampling from the middle of the palm on."""
     facing = np.sum(normals * palmar[weights.argmax(axis=1)], axis=1) > PALMAR_COSINE
     beyond_wrist = vertices[:, 0] > 0.012
     candidates = np.flatnonzero(facing & beyond_wrist)

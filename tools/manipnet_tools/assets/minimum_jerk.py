@@ -1,7 +1,7 @@
-"""Motion a person could have made: point-to-point movements of minimum jerk that overlap, and a tremor.
+"""Motion like a person's: overlapping point-to-point movements of minimum jerk, and a tremor.
 
-A movement adds its displacement, eased in and out, to whatever came before it; two that overlap make a smooth curve
-past the pose between them. (Flash and Hogan 1985: minimum jerk; Flash and Henis 1991: superposition.)
+A movement adds its displacement, eased in and out, to the motion before it; two that overlap make a smooth curve past
+the pose between them. Sources: Flash and Hogan 1985 (minimum jerk), Flash and Henis 1991 (superposition).
 """
 
 from collections.abc import Sequence
@@ -24,13 +24,13 @@ class Move:
 
 
 def ease(time_s: Array, start_s: float, end_s: float) -> Array:
-    """From 0 to 1 with the least jerk, at rest at both ends."""
+    """From 0 to 1 with minimum jerk, at rest at both ends."""
     u = np.clip((time_s - start_s) / (end_s - start_s), 0.0, 1.0)
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
 def superpose(time_s: Array, start: Array, moves: Sequence[Move]) -> Array:
-    """Poses `(T, 7)` at `time_s (T,)` of a body that rests at `start (7,)` and makes `moves` one after another."""
+    """Poses `(T, 7)` at `time_s (T,)` of a body that starts at rest at `start (7,)` and makes `moves`, in order."""
     positions = np.tile(start[:3], (len(time_s), 1))
     rotations = np.tile(start[3:], (len(time_s), 1))
     before = start
@@ -46,7 +46,7 @@ def superpose(time_s: Array, start: Array, moves: Sequence[Move]) -> Array:
 def tremor(time_s: Array, period_s: float, salt: int) -> Array:
     """Displacement `(T, 3)` of a hand that tries to be still, metres: slow sway and physiological tremor at 8 to 11 Hz.
 
-    It repeats after `period_s`. `salt` tells hands apart.
+    It repeats after `period_s`, and differs for each `salt`.
     """
     waves = [(hz, 6e-4 / (1.0 + 4.0 * hz)) for hz in (0.15, 0.32, 0.7, 1.3)] + [(hz, 2.5e-5) for hz in (8.1, 9.3, 10.7)]
     offset = np.zeros((len(time_s), 3))

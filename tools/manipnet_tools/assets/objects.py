@@ -1,7 +1,7 @@
-"""Generate the library of objects: `python -m manipnet_tools.assets.objects` rewrites the meshes the server ships.
+"""Generate the library of objects that the server ships: `python -m manipnet_tools.assets.objects`.
 
-Shapes are built in millimetres with Y up and the origin where a hand closes around them, and stored in metres.
-Needs manifold3d (extra `train`) for the unions.
+Meshes are built in millimetres, Y up, with the origin where a hand closes around them, and stored in metres. It needs
+manifold3d (extra `train`) for the unions.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ Line = NDArray[np.float64]
 
 
 def main() -> None:
-    """Write every shape."""
+    """Write the mesh of every object."""
     for name, shape in SHAPES.items():
         mesh = shape()
         write_ply(LIBRARY_FOLDER / f"{name}.ply", 1e-3 * mesh.vertices, mesh.faces)
@@ -91,7 +91,7 @@ def mug() -> Trimesh:
 
 
 def bottle() -> Trimesh:
-    """Diameter 68 mm, height 216 mm, closed and full; origin on the axis at half the body's height."""
+    """Diameter 68 mm, height 216 mm, closed and without a cavity; origin on the axis at half the body's height."""
     side = curve([(34, -64), (34, 0), (34, 64), (31, 82), (20, 108), (14.5, 124), (14, 148)], 28)
     return lathe(rounded([(0, -68), (34, -68), *side, (0, 148)], 3.0))
 
@@ -123,7 +123,7 @@ def wine_glass() -> Trimesh:
 
 
 def lathe(profile: Sequence[Point] | Line, sections: int = SEGMENTS) -> Trimesh:
-    """Turn a line of (radius, height) from axis to axis, upward on its outside, around Y."""
+    """The surface of revolution about Y of a line of (radius, height), from axis to axis and upward on its outside."""
     return upright(trimesh.creation.revolve(refined(np.array(profile, dtype=np.float64)), sections=sections))
 
 
@@ -150,12 +150,12 @@ def bar(path: Line, thickness: float, width: float) -> Trimesh:
 
 
 def upright(mesh: Trimesh) -> Trimesh:
-    """From the maker's Z up to Y up."""
+    """A mesh with Z up, turned so that Y is up."""
     return mesh.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 2.0, (1.0, 0.0, 0.0)))
 
 
 def subdivided(mesh: Trimesh, times: int) -> Trimesh:
-    """Every triangle split in four, `times` over."""
+    """Every triangle split into four, this many `times`."""
     return mesh.subdivide(iterations=times)
 
 
@@ -166,14 +166,14 @@ def turns(count: int) -> Line:
 
 
 def curve(knots: Sequence[Point], count: int) -> Line:
-    """Points `(count, 2)` along a curve through the knots that does not swing past them."""
+    """Points `(count, 2)` along a curve through the knots that does not overshoot them."""
     points = np.array(knots, dtype=np.float64)
     along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))]
     return PchipInterpolator(along, points)(np.linspace(0.0, along[-1], count))
 
 
 def rounded(line: Sequence[Point | NDArray], radius: float) -> Line:
-    """The line with its sharp corners (over 40 degrees) replaced by short arcs; its ends stay."""
+    """The line with its sharp corners (over 40 degrees) replaced by short arcs; its ends remain."""
     points = np.array(line, dtype=np.float64)
     result = [points[:1]]
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):

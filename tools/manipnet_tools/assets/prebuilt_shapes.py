@@ -1,5 +1,7 @@
-"""Builds the shapes of the demo's objects ahead: `python -m manipnet_tools.assets.prebuilt_shapes` after a change of
-either."""
+"""Build the shapes of the demo's objects in advance.
+
+Run `python -m manipnet_tools.assets.prebuilt_shapes` after a change of the objects or of the code that builds shapes.
+"""
 
 import tempfile
 from pathlib import Path
@@ -12,7 +14,7 @@ from manipnet.synthesis.objects.shape import PREBUILT_FOLDER, build_shape, cache
 
 
 def main() -> None:
-    """Replace the files in the package."""
+    """Replace the shapes in the package."""
     PREBUILT_FOLDER.mkdir(exist_ok=True)
     for old in PREBUILT_FOLDER.glob("*.npz"):
         old.unlink()

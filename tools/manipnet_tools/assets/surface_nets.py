@@ -1,7 +1,7 @@
-"""A closed triangle mesh around the inside of an implicit surface: naive surface nets, then a polish on the surface.
+"""A closed triangle mesh of an implicit surface: naive surface nets, whose vertices are then moved onto the surface.
 
-After Gibson, "Constrained elastic surface nets" (1998): one vertex per grid cell that the surface crosses, one quad per
-grid edge that it crosses.
+There is one vertex per grid cell that the surface crosses, and one quad per grid edge that it crosses. Source: Gibson,
+"Constrained elastic surface nets", 1998.
 """
 
 from collections.abc import Callable
@@ -21,20 +21,20 @@ _EDGES = [(a, b) for a in range(8) for b in range(a + 1, 8) if np.abs(_CORNERS[a
 def extract(field: Field, low: Array, high: Array, cell: float) -> tuple[Array, NDArray[np.int64]]:
     """Vertices `(V, 3)` and outward triangles `(F, 3)` of `field == 0` in the box from `low` to `high`.
 
-    Raises `ValueError` where the surface leaves the box, which would leave a hole.
+    Raises `ValueError` if the surface leaves the box, which would make a hole.
     """
     axes = [np.arange(a, b + cell, cell) for a, b in zip(low, high, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     values = field(grid.reshape(-1, 3)).reshape(grid.shape[:3])
     inside = values < 0.0
     if np.any(inside & ~_interior(inside.shape)):
-        raise ValueError("the surface reaches the border of the box: enlarge low and high")
+        raise ValueError("the surface reaches the border of the box; enlarge the box between low and high")
     vertices, index = _cell_vertices(values, inside)
     return vertices * cell + low, _triangles(inside, index, vertices)
 
 
 def polish(field: Field, vertices: Array, faces: NDArray[np.int64], rounds: int) -> tuple[Array, NDArray[np.float64]]:
-    """Spread the vertices evenly along the surface and put them on it; returns them with their unit normals."""
+    """Spread the vertices evenly along the surface and move them onto it; returns them with their unit normals."""
     for _ in range(rounds):
         normals = gradient(field, vertices)
         drift = neighbour_mean(vertices, faces) - vertices

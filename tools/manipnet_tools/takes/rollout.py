@@ -1,6 +1,6 @@
 """From a take to synthesised hands, offline, through the live timeline and the live synthesis.
 
-Captured fingers have no way in here.
+Captured fingers are not used.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ class BodyTicks:
     """One body at `n` ticks, in the world."""
 
     windows: Array
-    """`(n, 21, 7)` poses about the instant each tick is computed from."""
+    """`(n, 21, 7)` poses about the instant from which each tick is computed."""
     poses: Array
     """`(n, 7)` at the tick itself."""
     ages_s: Array
@@ -42,7 +42,7 @@ class BodyTicks:
 
 @dataclass(frozen=True)
 class Ticks:
-    """What a live session sees of a take, 60 times a second: `time_s (n,)` from the take's first frame."""
+    """A take as a live session sees it, 60 times a second; `time_s (n,)` starts at the take's first frame."""
 
     time_s: Array
     bodies: dict[str, BodyTicks]
@@ -53,9 +53,9 @@ class Ticks:
 
 @dataclass(frozen=True)
 class HandInput:
-    """All that the synthesis of one hand gets at `n` ticks: windows `(n, 21, 7)` in the world, shapes and a scale.
+    """The whole input of the synthesis of one hand at `n` ticks: windows `(n, 21, 7)` in the world, shapes and a scale.
 
-    `held (n,)` says which of the `shapes` the hand deals with; `object` are that one's windows.
+    `held (n,)` is the index of the shape that the hand handles, and `object` are the windows of that one.
     """
 
     side: Side
@@ -79,14 +79,14 @@ class HandInput:
         )
 
     def scene(self, tick: int) -> HandScene:
-        """What the synthesis sees at one tick."""
+        """The scene at one tick."""
         shape = self.shapes[self.held[tick]]
         return HandScene(self.side, self.wrist[tick], self.other_wrist[tick], self.object[tick], shape, self.scale)
 
 
 @dataclass(frozen=True)
 class HandMotion:
-    """A synthesised hand in the canonical wrist frame, `n` ticks; named as in `HandState` and `HandStep`."""
+    """A synthesised hand at `n` ticks in the canonical wrist frame; the fields are those of `HandStep`."""
 
     angles: Array
     positions: Array
@@ -96,9 +96,9 @@ class HandMotion:
 
 
 def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
-    """Stream a take into a `Timeline` and collect the ticks whose future has arrived when it ends.
+    """Stream a take into a `Timeline` and collect the ticks that fall due before it ends.
 
-    The first half second, whose past is not in the take, is left out. Raises `TakeError` when nothing remains.
+    The first half second is left out, because its past is not in the take. Raises `TakeError` if nothing remains.
     """
     timeline = Timeline(look_ahead_s)
     ticks: list[Tick] = []
@@ -126,15 +126,16 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
 
 def _too_little(take: Take, ticks: Sequence[Tick]) -> str:
     if never := [name for name in take.bodies if not any(name in tick.bodies for tick in ticks)] if ticks else []:
-        return f"{take.name}: {', '.join(never)} is never tracked where the others are"
+        return f"{take.name}: {', '.join(never)} is never tracked while the other bodies are"
     length_s = float(take.time_s[-1] - take.time_s[0])
-    return f"{take.name}: is {length_s:.2f} s long; fingers need half a second before and after, so more than 1 s"
+    wanted = "it must be longer than 1 s, which leaves half a second before and after a tick"
+    return f"{take.name}: is {length_s:.2f} s long; {wanted}"
 
 
 def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0) -> dict[Side, HandInput]:
-    """Inputs of both hands, each dealing with one of the bodies in `shapes` at a time.
+    """Inputs of both hands, each of which handles one of the bodies in `shapes` at a time.
 
-    For hands of another size than the model's the scene is as the model's hand would see it: smaller for a larger one.
+    The model's hand has one size, so for hands that are `hand_scale` times as large everything else is made smaller.
     """
     windows = np.stack([ticks.bodies[name].windows for name in shapes])
     inputs = {}
@@ -155,7 +156,7 @@ def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0)
 
 
 def _held(ticks: Ticks, side: Side, shapes: dict[str, Shape]) -> NDArray[np.int64]:
-    """Index into `shapes` of what each tick's hand deals with, `(n,)`, chosen as the server chooses."""
+    """Index of the shape that the hand handles at each tick, `(n,)`, chosen as the server chooses it."""
     props = [Prop(name, name, shape) for name, shape in shapes.items()]
     wrists, held, prop = ticks.bodies[f"{side}_wrist"].poses, [], props[0]
     for k, wrist in enumerate(wrists):
@@ -169,9 +170,9 @@ def roll_out(
     hands: Sequence[HandInput],
     advance: Callable[[int], None] = lambda steps: None,
 ) -> list[HandMotion]:
-    """Synthesise every hand from the neutral pose on, all in step so that they share network batches.
+    """Synthesise every hand from the neutral pose on, all in step, so that they share network batches.
 
-    `advance` hears how many hand-ticks each step was.
+    `advance` is called with the number of hand-ticks of each step.
     """
     states = [synthesizer.rest_state() for _ in hands]
     steps: list[list[HandStep]] = [[] for _ in hands]

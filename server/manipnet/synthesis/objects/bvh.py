@@ -1,8 +1,8 @@
 """A bounding volume hierarchy over triangles: exact closest points with signs, and ray hits.
 
-Compiled with numba because a tick asks for several hundred closest points. The tree is two flat arrays, so it is
-cached on disk as it is and shared by threads without locks. Signs come from angle-weighted pseudo-normals (Bærentzen
-and Aanæs 2005), exact on closed meshes.
+Its queries are compiled, because a tick makes several hundred of them. The tree is two flat arrays, so it is cached on
+disk as it is and shared by threads without locks. Signs come from angle-weighted pseudo-normals, which are exact on
+closed meshes (Bærentzen and Aanæs 2005).
 """
 
 from typing import NamedTuple
@@ -16,20 +16,20 @@ from manipnet.jit import inner, stack_array
 _BINS = 12
 _LEAF_TRIANGLES = 3
 _BINNED_LEVELS = 48
-"""Below this depth nodes are halved: what is left there is degenerate, and the tree must stay flat enough."""
+"""Deeper nodes are halved, because they are degenerate and the depth of the tree must stay bounded."""
 _MOST_LEVELS = _BINNED_LEVELS + 24
 _STACK = 96
-"""Room for a walk down any tree, one node waiting per level."""
+"""Enough for a walk down any tree with one waiting node per level."""
 _nodes, _numbers = stack_array(_STACK, dtype=types.int32), stack_array(_STACK)
 
 
 class Bvh(NamedTuple):
-    """Triangles in tree order. A tuple of arrays, so that numba kernels take it as one argument."""
+    """Triangles in tree order. It is a tuple of arrays, which kernels take as one argument."""
 
     boxes: Array
     """`(N, 6)` lower and upper corner of each node, metres."""
     links: np.ndarray
-    """`(N, 2)` int32: (first triangle, count) of a leaf, (left child, 0) of an inner node; right = left + 1."""
+    """`(N, 2)` int32: (first triangle, count) of a leaf; (left child, 0) of an inner node; the right child is next."""
     corners: Array
     """`(F, 3, 3)` triangle corners, metres."""
     normals: Array
@@ -37,7 +37,7 @@ class Bvh(NamedTuple):
 
 
 def _order_triangles(corners: Array) -> tuple[Array, np.ndarray, np.ndarray]:
-    """Binned surface-area-heuristic build, level by level. Returns boxes, links and the triangles in leaf order."""
+    """Build by the binned surface area heuristic, level by level; returns boxes, links and triangles in leaf order."""
     lower, upper = corners.min(axis=1), corners.max(axis=1)
     order = np.arange(len(corners))
     firsts, counts = np.zeros(1, np.int64), np.array([len(corners)])
@@ -59,7 +59,7 @@ def _order_triangles(corners: Array) -> tuple[Array, np.ndarray, np.ndarray]:
 
 
 def _members(order: np.ndarray, firsts: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the triangles of some nodes are in `order`, node after node, and where each node begins among them."""
+    """The places in `order` of the triangles of some nodes, node after node, and where each node begins among them."""
     starts = np.cumsum(counts) - counts
     return np.repeat(firsts - starts, counts) + np.arange(counts.sum()), starts
 
@@ -73,9 +73,9 @@ def _boxes(lower: Array, upper: Array, order: np.ndarray, firsts: np.ndarray, co
 def _partition(
     lower: Array, upper: Array, order: np.ndarray, firsts: np.ndarray, counts: np.ndarray, by_middle: bool
 ) -> np.ndarray:
-    """Sort every node's triangles along its longest axis, by bins; returns how many go to the left, at least one.
+    """Sort the triangles of every node along its longest axis, by bins; returns how many go to the left, at least one.
 
-    The border is the cheapest one between bins, or in the middle where there is none.
+    The border is the cheapest one between bins, or the middle if all triangles are in one bin.
     """
     at, starts = _members(order, firsts, counts)
     triangles, node = order[at], np.repeat(np.arange(len(counts)), counts)
@@ -104,7 +104,7 @@ def _partition(
 
 
 def _costs(low: Array, high: Array, sizes: np.ndarray) -> Array:
-    """Half the surface of the first 1, 2, … bins times their triangles `(nodes, bins)`; infinite where empty."""
+    """Half the surface of the first 1, 2, … bins times their number of triangles `(nodes, bins)`; infinite if empty."""
     spans = np.maximum.accumulate(high, axis=1) - np.minimum.accumulate(low, axis=1)
     totals = np.cumsum(sizes, axis=1)
     x, y, z = np.moveaxis(np.where(totals[..., None] > 0, spans, 0.0), -1, 0)
@@ -119,7 +119,7 @@ def build_bvh(vertices: Array, faces: np.ndarray) -> Bvh:
 
 
 def pseudo_normals(vertices: Array, faces: np.ndarray) -> Array:
-    """Angle-weighted pseudo-normals `(F, 7, 3)` of each face, its edges 01, 12, 20 and its corners."""
+    """Angle-weighted pseudo-normals `(F, 7, 3)` of each face: its own, of its edges 01, 12, 20, of its corners."""
     corners = np.asarray(vertices, dtype=np.float64)[faces]
     sides = np.roll(corners, -1, axis=1) - corners
     face = np.cross(sides[:, 0], sides[:, 1])
@@ -138,10 +138,10 @@ def pseudo_normals(vertices: Array, faces: np.ndarray) -> Array:
 
 
 @inner
-def _closest_on_triangle(px, py, pz, t, f):
-    """Closest point of triangle `t[f]` of `t (F, 3, 3)`: coordinates and region (0 face, 1-3 edges, 4-6 corners).
+def _closest_on_triangle(px: float, py: float, pz: float, t: Array, f):
+    """Closest point of the triangle `t[f]` of `t (F, 3, 3)`: coordinates and region (0 face, 1-3 edges, 4-6 corners).
 
-    Ericson, Real-Time Collision Detection, section 5.1.5.
+    Source: Ericson, Real-Time Collision Detection, section 5.1.5.
     """
     ax, ay, az = t[f, 0, 0], t[f, 0, 1], t[f, 0, 2]
     abx, aby, abz = t[f, 1, 0] - ax, t[f, 1, 1] - ay, t[f, 1, 2] - az
@@ -184,7 +184,7 @@ def _closest_on_triangle(px, py, pz, t, f):
 
 
 @inner
-def _box_distance_squared(boxes, node, px, py, pz):
+def _box_distance_squared(boxes: Array, node, px: float, py: float, pz: float):
     x = max(boxes[node, 0] - px, 0.0, px - boxes[node, 3])
     y = max(boxes[node, 1] - py, 0.0, py - boxes[node, 4])
     z = max(boxes[node, 2] - pz, 0.0, pz - boxes[node, 5])
@@ -192,8 +192,8 @@ def _box_distance_squared(boxes, node, px, py, pz):
 
 
 @inner
-def closest_point(bvh, px, py, pz, seed):
-    """Signed distance, closest point and its triangle for one query; `seed` is a triangle guessed to be near, or -1.
+def closest_point(bvh: Bvh, px: float, py: float, pz: float, seed):
+    """The point of the mesh that is closest to a query point; `seed` is a triangle guessed to be near, or -1.
 
     Returns `(signed distance, cx, cy, cz, triangle, region)`; the distance is negative inside.
     """
@@ -235,9 +235,11 @@ def closest_point(bvh, px, py, pz, seed):
 
 
 @inner
-def trace_ray(bvh, ox, oy, oz, dx, dy, dz):
-    """First hit of one ray (Möller and Trumbore 1997): distance along the unit direction, `inf` without a hit, and
-    the triangle."""
+def trace_ray(bvh: Bvh, ox: float, oy: float, oz: float, dx: float, dy: float, dz: float):
+    """First hit of one ray: the distance along the unit direction, `inf` without a hit, and the triangle.
+
+    Source: Möller and Trumbore 1997.
+    """
     ix = 1.0 / dx if dx != 0.0 else np.inf
     iy = 1.0 / dy if dy != 0.0 else np.inf
     iz = 1.0 / dz if dz != 0.0 else np.inf

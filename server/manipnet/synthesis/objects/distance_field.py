@@ -1,8 +1,8 @@
-"""A grid of signed distances around a closed mesh: cheap far look-ups, a first guess for exact ones, and robust signs.
+"""A grid of signed distances around a closed mesh: cheap look-ups, a first guess for exact distances, and robust signs.
 
-The paper's section 5.3 pre-computes a field, finds the surface with it and then computes the exact distance. Here the
-field alone answers where the surface is several cells away (trilinear interpolation is then within a small fraction
-of a millimetre) and names a near triangle where it is not.
+The paper (section 5.3) computes a field in advance, finds the surface with it and then computes the exact distance.
+Here the field alone answers if the surface is several cells away, where trilinear interpolation errs by a small
+fraction of a millimetre. Nearer to the surface it names a near triangle, from which the exact search starts.
 """
 
 import os
@@ -16,13 +16,13 @@ from manipnet.jit import inner, kernel
 from manipnet.synthesis.objects.bvh import Bvh, closest_point
 
 MARGIN_M = 0.12
-"""How far the grid reaches beyond the mesh: the sensors saturate at 0.10 m."""
+"""The grid extends this far beyond the mesh; the sensors saturate at 0.10 m."""
 RESOLUTION = 88
 """Grid points along the longest side."""
 EXACT_WITHIN_CELLS = 3.0
-"""Nearer to the surface than this, a distance is refined exactly."""
+"""Distances below this many cells are computed exactly."""
 _NODE_REACH_CELLS = 0.87
-"""No grid point is farther than half a cell diagonal from a query."""
+"""The grid point nearest to a query is at most half a cell diagonal away."""
 
 
 class Field(NamedTuple):
@@ -33,11 +33,11 @@ class Field(NamedTuple):
     distance: np.ndarray
     """`(X, Y, Z)` float32, metres."""
     triangle: np.ndarray
-    """`(X, Y, Z)` int32, index into the tree's triangles."""
+    """`(X, Y, Z)` int32, index among the tree's triangles."""
 
 
 def build_field(bvh: Bvh) -> Field:
-    """Sample the exact distance to `bvh` on a grid; the sign is the winding number along vertical lines."""
+    """Sample the exact distance to `bvh` on a grid; the sign comes from winding numbers along vertical lines."""
     lower, upper = bvh.boxes[0, :3] - MARGIN_M, bvh.boxes[0, 3:] + MARGIN_M
     cell = float(np.max(upper - lower)) / (RESOLUTION - 1)
     shape = np.ceil((upper - lower) / cell).astype(np.int64) + 1
@@ -52,8 +52,8 @@ def build_field(bvh: Bvh) -> Field:
 
 
 @kernel
-def _sample(bvh, lower, cell, slab, distance, triangle):
-    """Unsigned distances and nearest triangles of the grid points with first index in `slab`."""
+def _sample(bvh: Bvh, lower: Array, cell: float, slab: np.ndarray, distance: np.ndarray, triangle: np.ndarray):
+    """Unsigned distances and nearest triangles of the grid points whose first index is in `slab`."""
     near = -1
     for i in slab:
         for j in range(distance.shape[1]):
@@ -65,8 +65,8 @@ def _sample(bvh, lower, cell, slab, distance, triangle):
 
 
 def _inside_by_columns(corners: Array, lower: Array, cell: float, shape: np.ndarray) -> np.ndarray:
-    """Winding number above one half at every grid point, by counting oriented crossings of vertical lines above it."""
-    # a tiny irrational shift keeps lines off shared edges and corners
+    """Whether the winding number of every grid point is above one half, by counting the oriented crossings above it."""
+    # a tiny irrational shift keeps the lines off shared edges and corners
     origin = lower[:2] + 1e-7 * np.sqrt([2.2, 3.3])
     flat = (corners[:, :, :2] - origin) / cell
     first = np.maximum(np.ceil(flat.min(axis=1)).astype(np.int64), 0)
@@ -94,8 +94,8 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 @inner
-def field_distance(field, px, py, pz):
-    """Trilinear signed distance and its gradient at one point: `(distance, gx, gy, gz)`; clamped outside the grid."""
+def field_distance(field: Field, px: float, py: float, pz: float):
+    """Trilinear signed distance at one point and its gradient, `(distance, gx, gy, gz)`; clamped outside the grid."""
     d, per_m = field.distance, 1.0 / field.cell_m
     nx, ny, nz = d.shape
     x = min(max((px - field.origin[0]) * per_m, 0.0), nx - 1.000001)
@@ -114,10 +114,10 @@ def field_distance(field, px, py, pz):
 
 
 @inner
-def signed_distance(bvh, field, px, py, pz, exact_within_m):
-    """Signed distance and outward unit direction at one point: `(distance, nx, ny, nz)`.
+def signed_distance(bvh: Bvh, field: Field, px: float, py: float, pz: float, exact_within_m: float):
+    """Signed distance at one point and the outward unit direction, `(distance, nx, ny, nz)`.
 
-    Exact where the field is within `exact_within_m` of the surface (`inf`: always), interpolated beyond.
+    They are exact if the field's value is below `exact_within_m` (`inf`: always), and interpolated otherwise.
     """
     rough, gx, gy, gz = field_distance(field, px, py, pz)
     if abs(rough) > exact_within_m:
@@ -129,8 +129,8 @@ def signed_distance(bvh, field, px, py, pz, exact_within_m):
     j = min(max(round((py - field.origin[1]) / cell), 0), ny - 1)
     k = min(max(round((pz - field.origin[2]) / cell), 0), nz - 1)
     d, x, y, z, triangle, region = closest_point(bvh, px, py, pz, field.triangle[i, j, k])
-    # farther from the surface than any grid point is from here, that grid point has our sign: it holds even where
-    # a mesh crosses itself and pseudo-normals do not
+    # a point farther from the surface than from its grid point has the sign of that grid point; this holds even where a
+    # mesh crosses itself, and pseudo-normals fail
     if abs(d) > _NODE_REACH_CELLS * cell and (field.distance[i, j, k] < 0.0) != (d < 0.0):
         on_grid = abs(px - field.origin[0] - i * cell) <= cell and abs(py - field.origin[1] - j * cell) <= cell
         if on_grid and abs(pz - field.origin[2] - k * cell) <= cell:

@@ -1,4 +1,4 @@
-"""The objects that come with the server: generated shapes in metres, Y up, by name."""
+"""The objects that come with the server, by name: generated meshes in metres, Y up."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -15,14 +15,14 @@ def library_names() -> tuple[str, ...]:
 
 
 def library_file(name: str) -> Path | None:
-    """The mesh file of the library object `name`, None for a name it does not have."""
+    """The mesh file of a library object; None if there is no object of this name."""
     return LIBRARY_FOLDER / f"{name}.ply" if name in library_names() else None
 
 
 def load_library_mesh(name: str, scale: float = 1.0) -> "ClosedMesh":
-    """The library object `name`; raises `MeshError` for a name it does not have."""
-    from manipnet.synthesis.objects.mesh import MeshError, load_mesh  # what only needs the names does without trimesh
+    """The mesh of a library object. Raises `MeshError` if there is no object of this name."""
+    from manipnet.synthesis.objects.mesh import MeshError, load_mesh  # reading the names takes no trimesh
 
     if name not in library_names():
-        raise MeshError(f"no object {name!r} in the library; it has {', '.join(library_names())}")
+        raise MeshError(f"the library has no object {name!r}; it has {', '.join(library_names())}")
     return load_mesh(LIBRARY_FOLDER / f"{name}.ply", scale=scale)

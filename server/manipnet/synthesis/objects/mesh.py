@@ -1,4 +1,4 @@
-"""Object meshes: read in metres, closed and turned outward, or refused with the reason and the remedy."""
+"""Meshes of objects: read in metres, closed and turned outward, or refused with the reason and the remedy."""
 
 import hashlib
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ SIZE_RANGE_M: Final = (0.005, 3.0)
 
 
 class MeshError(ValueError):
-    """A mesh that cannot be an object; the text names what is wrong, where, and what to do about it."""
+    """A mesh cannot be used as an object; the text says what is wrong, where, and what to do about it."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedMesh:
-    """A watertight triangle mesh in metres: `vertices (V, 3)`, `faces (F, 3)` int32 turned outward.
+    """A watertight triangle mesh in metres: `vertices (V, 3)`, and `faces (F, 3)` int32, turned outward.
 
-    `content_hash` identifies the geometry, whatever file it came from.
+    `content_hash` identifies the geometry, independently of its file.
     """
 
     name: str
@@ -44,16 +44,16 @@ class ClosedMesh:
 
 
 def load_mesh(path: Path | str, unit: str = "m", scale: float = 1.0, name: str | None = None) -> ClosedMesh:
-    """Read OBJ, PLY, STL or GLB and close it. `unit` is the file's; `scale` resizes about the origin on top.
+    """Read an OBJ, PLY, STL or GLB file in `unit` and close the mesh; `scale` resizes it about its origin.
 
-    Raises `MeshError`, which starts with the path.
+    Raises `MeshError`, whose text starts with the path.
     """
     path = Path(path)
     try:
         if unit not in UNITS_M:
             raise MeshError(f"unit {unit!r} is unknown; allowed are {', '.join(UNITS_M)}")
         if not (np.isfinite(scale) and 1e-3 <= scale <= 1e3):
-            raise MeshError(f"scale {scale} is outside 0.001 to 1000")
+            raise MeshError(f"scale is {scale}; allowed are 0.001 to 1000")
         vertices, faces = _read(path)
         return closed_mesh(vertices * (UNITS_M[unit] * scale), faces, name or path.stem)
     except MeshError as error:
@@ -61,10 +61,10 @@ def load_mesh(path: Path | str, unit: str = "m", scale: float = 1.0, name: str |
 
 
 def closed_mesh(vertices: NDArray, faces: NDArray, name: str) -> ClosedMesh:
-    """Check and repair a triangle mesh in metres; raises `MeshError` if it cannot be closed.
+    """Check and repair a triangle mesh in metres. Raises `MeshError` if it cannot be closed.
 
-    Repairs are those that do not change the shape: vertices at the same place merged, repeated faces and debris
-    dropped, small holes closed, faces turned outward. A mesh that is closed already keeps its arrays.
+    Repairs do not change the shape: vertices at the same place are merged, repeated faces and debris are dropped, small
+    holes are closed, and faces are turned outward. A mesh that is already closed keeps its arrays.
     """
     vertices, faces = np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int32)
     _check_arrays(vertices, faces)
@@ -82,14 +82,14 @@ def closed_mesh(vertices: NDArray, faces: NDArray, name: str) -> ClosedMesh:
 
 def _read(path: Path) -> tuple[NDArray, NDArray]:
     if path.suffix.lower() not in FORMATS:
-        raise MeshError(f"{path.suffix or 'no'} format is unknown; allowed are {', '.join(FORMATS)}")
+        raise MeshError(f"the format {path.suffix!r} is unknown; allowed are {', '.join(FORMATS)}")
     if not path.is_file():
         raise MeshError("no such file")
     if path.stat().st_size > MAX_FILE_BYTES:
-        raise MeshError(f"file is over {MAX_FILE_BYTES // 1_000_000} MB; reduce the mesh before loading")
+        raise MeshError(f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB; reduce the mesh first")
     try:
         mesh = trimesh.load_mesh(path, process=False, **({"skip_materials": True} if _is_obj(path) else {}))
-    except Exception as error:  # readers of foreign formats raise whatever they stumble over
+    except Exception as error:  # readers of foreign formats raise exceptions of any kind
         reason = f"{type(error).__name__}: {error}"
         raise MeshError(f"cannot be read as {path.suffix[1:].upper()} ({reason}); export it again") from None
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
@@ -103,15 +103,15 @@ def _is_obj(path: Path) -> bool:
 
 def _check_arrays(vertices: NDArray, faces: NDArray) -> None:
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
-        raise MeshError(f"needs vertices (V, 3) and faces (F, 3), found {vertices.shape} and {faces.shape}")
+        raise MeshError(f"has vertices {vertices.shape} and faces {faces.shape}; expected are (V, 3) and (F, 3)")
     if not np.isfinite(vertices).all():
         bad = int(np.argwhere(~np.isfinite(vertices))[0, 0])
         raise MeshError(f"vertex {bad} is not finite: {vertices[bad]}; export the mesh again")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise MeshError(f"a face names vertex {faces.max()}, allowed are 0 to {len(vertices) - 1}")
+        raise MeshError(f"has a face with vertex {faces.max()}; allowed are 0 to {len(vertices) - 1}")
     if len(faces) > MAX_FACES:
         raise MeshError(
-            f"{len(faces)} triangles, allowed are {MAX_FACES}; decimate it (5,000 show no less of the shape)"
+            f"has {len(faces)} triangles; at most {MAX_FACES} are allowed; decimate it (5,000 suffice for most shapes)"
         )
 
 
@@ -122,19 +122,19 @@ def _check_size(vertices: NDArray) -> None:
         return
     hint = next((unit for unit, metre in UNITS_M.items() if 0.03 <= size * metre <= 0.6), None)
     remedy = f'set unit = "{hint}" if the file is in {hint}' if hint else "set its unit or scale"
-    raise MeshError(f"is {size:.3g} m across, allowed are {smallest} to {largest} m; {remedy}")
+    raise MeshError(f"is {size:.3g} m across; allowed are {smallest} to {largest} m; {remedy}")
 
 
 def _check_closed(vertices: NDArray, faces: NDArray) -> None:
     if not len(faces):
-        raise MeshError("has no triangle with an area")
+        raise MeshError("has no triangle with an area; export the surface again")
     edges = mesh_edges(faces)
     open_edges, crowded = edges.ends[edges.uses == 1], edges.ends[edges.uses > 2]
     if len(open_edges):
         points = vertices[open_edges.reshape(-1)]
         raise MeshError(
-            f"is not closed: {len(open_edges)} open edges around {_place(points)}, an opening up to "
-            f"{100 * np.ptp(points, axis=0).max():.1f} cm wide. A sheet has no inside: give it a thickness "
+            f"is not closed: {len(open_edges)} open edges around {_place(points)}, which span "
+            f"{100 * np.ptp(points, axis=0).max():.1f} cm. A sheet has no inside: give it a thickness "
             "(Blender: Solidify) or close it (Blender: Mesh > Clean Up > Fill Holes)"
         )
     if len(crowded):
@@ -144,7 +144,7 @@ def _check_closed(vertices: NDArray, faces: NDArray) -> None:
         )
     size = float(np.ptp(vertices, axis=0).max())
     if signed_volume(vertices, faces) < 1e-5 * size**3:
-        raise MeshError("encloses no volume: it is flat, or inside out in parts; give it a thickness")
+        raise MeshError("encloses no volume: it is flat, or parts of it are inside out; give it a thickness")
 
 
 def _place(points: NDArray) -> str:

@@ -1,4 +1,4 @@
-"""First hits of many rays on a mesh: Embree where it has a wheel, our own tree elsewhere, the same answers."""
+"""First hits of many rays on a mesh: by Embree where it has a wheel, elsewhere by our own tree, with equal results."""
 
 from typing import Protocol
 
@@ -18,7 +18,7 @@ except ImportError:  # no wheel for this platform (Linux ARM)
 
 
 class RayScene(Protocol):
-    """Something rays can be traced against."""
+    """A mesh that rays can be traced against."""
 
     def trace(self, origins: Array, directions: Array) -> tuple[np.ndarray, np.ndarray]:
         """First hits of rays `(N, 3)` with unit directions.
@@ -30,7 +30,7 @@ class RayScene(Protocol):
 
 
 class EmbreeRays:
-    """Embree called directly: about four times faster than through trimesh's wrapper."""
+    """Embree, called directly, which is about four times faster than through trimesh's wrapper."""
 
     def __init__(self, bvh: Bvh) -> None:
         self._scene = EmbreeScene()
@@ -43,13 +43,15 @@ class EmbreeRays:
         aims = np.ascontiguousarray(directions, dtype=np.float32)
         hits = self._scene.run(starts, aims, query="INTERSECT", output=True)
         facing_away = np.empty(len(aims), np.bool_)
-        _judge(hits["primID"], hits["Ng"], aims, hits["tfar"], facing_away)
+        _finish_hits(hits["primID"], hits["Ng"], aims, hits["tfar"], facing_away)
         return hits["tfar"], facing_away
 
 
 @kernel
-def _judge(triangle, normals, directions, distance, facing_away):
-    """Of hits as Embree gives them: set the `distance` of a miss, and say which surfaces face away."""
+def _finish_hits(
+    triangle: np.ndarray, normals: np.ndarray, directions: np.ndarray, distance: np.ndarray, facing_away: np.ndarray
+):
+    """Set the `distance` of Embree's misses, and find which hit surfaces face away."""
     for i in range(len(triangle)):
         n, d = normals[i], directions[i]
         missed = triangle[i] < 0
@@ -59,7 +61,7 @@ def _judge(triangle, normals, directions, distance, facing_away):
 
 
 class TreeRays:
-    """The same on our own tree, for platforms without Embree."""
+    """Our own tree, for platforms without Embree."""
 
     def __init__(self, bvh: Bvh) -> None:
         self._bvh = bvh
@@ -78,12 +80,12 @@ class TreeRays:
 
 
 def ray_scene(bvh: Bvh) -> RayScene:
-    """The fastest ray scene this platform has."""
+    """The fastest ray scene on this platform."""
     return EmbreeRays(bvh) if HAS_EMBREE else TreeRays(bvh)
 
 
 @kernel
-def _trace_all(bvh, origins, directions, distance, facing_away):
+def _trace_all(bvh: Bvh, origins: Array, directions: Array, distance: Array, facing_away: np.ndarray):
     for i in range(len(origins)):
         d = directions[i]
         hit, triangle = trace_ray(bvh, origins[i, 0], origins[i, 1], origins[i, 2], d[0], d[1], d[2])

@@ -1,4 +1,4 @@
-"""Small repairs that turn a nearly closed triangle mesh into a closed one, on plain index arrays."""
+"""Small repairs that close a nearly closed triangle mesh, on plain index arrays."""
 
 from dataclasses import dataclass
 
@@ -10,18 +10,24 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int32]
 
-_WELD = 1e-6  # of the mesh's size: closer vertices are one
-_MAX_HOLE = 0.25  # of the mesh's size: a wider opening is a shape, such as a vessel without walls, and not a flaw
+_WELD = 1e-6
+"""Vertices nearer to each other than this, relative to the mesh's size, are merged."""
+_MAX_HOLE = 0.25
+"""A wider opening, relative to the mesh's size, belongs to the shape (a vessel without walls) and is not a flaw."""
 
 
 @dataclass(frozen=True)
 class Edges:
-    """Undirected edges `ends` `(E, 2)` and their `uses`; for every half-edge of the faces its edge and sign."""
+    """The undirected edges of some faces."""
 
     ends: NDArray[np.int32]
+    """`(E, 2)` the two vertices of each, the lower one first."""
     of_half: NDArray[np.intp]
+    """`(3 F,)` the edge of each half-edge."""
     forward: NDArray[np.bool_]
+    """`(3 F,)` whether the half-edge runs from the lower vertex to the higher one."""
     uses: NDArray[np.intp]
+    """`(E,)` the number of half-edges of each."""
 
 
 def mesh_edges(faces: Faces) -> Edges:
@@ -37,20 +43,20 @@ def is_closed(faces: Faces) -> bool:
 
 
 def is_consistent(faces: Faces) -> bool:
-    """Whether no edge is run through twice in the same direction."""
+    """Whether no two half-edges run along an edge in the same direction."""
     half = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
     return len(np.unique(half, axis=0)) == len(half)
 
 
 def weld(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
-    """Merge vertices at the same place, then drop the faces and vertices this leaves without meaning."""
+    """Merge vertices at the same place, and drop the faces and vertices that become superfluous."""
     size = max(float(np.ptp(vertices, axis=0).max()), 1e-12)
     _, first, to = np.unique(np.round(vertices / (_WELD * size)), axis=0, return_index=True, return_inverse=True)
     return compact(vertices[first], to.reshape(-1)[faces].astype(np.int32))
 
 
 def compact(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
-    """Drop faces with a repeated corner, repeated faces, and vertices no face uses."""
+    """Drop faces with a repeated corner, repeated faces, and vertices that no face uses."""
     corners = np.sort(faces, axis=1)
     distinct = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])
     faces, corners = faces[distinct], corners[distinct]
@@ -62,7 +68,7 @@ def compact(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
 def orient(vertices: Vertices, faces: Faces) -> Faces:
     """Turn faces so that neighbours agree and the mesh encloses a positive volume.
 
-    An already consistent mesh is turned as a whole, so inner walls keep facing the cavity they bound.
+    A mesh that is already consistent is turned as a whole, so that inner walls keep facing the cavity.
     """
     if not is_consistent(faces):
         faces = _agree(faces)
@@ -73,24 +79,24 @@ def orient(vertices: Vertices, faces: Faces) -> Faces:
 
 
 def drop_debris(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
-    """Drop connected parts that enclose next to nothing, such as a stray triangle once its hole is filled."""
+    """Drop connected parts that enclose almost no volume, such as a stray triangle whose hole was filled."""
     _, part = connected_components(_adjacency(faces)[0], directed=False)
     volume = np.abs(np.bincount(part, weights=_face_volumes(vertices, faces)))
     return compact(vertices, faces[(volume > 1e-6 * volume.sum())[part]])
 
 
 def signed_volume(vertices: Vertices, faces: Faces) -> float:
-    """Enclosed volume, positive when the faces turn counter-clockwise seen from outside."""
+    """The enclosed volume; it is positive if the faces turn counter-clockwise seen from outside."""
     return float(_face_volumes(vertices, faces).sum())
 
 
 def fill_small_holes(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
-    """Close each simple opening no wider than a quarter of the mesh by a fan around its centre."""
+    """Close each simple opening of at most a quarter of the mesh's size by a fan around its centre."""
     edges = mesh_edges(faces)
     half = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
     rim = half[edges.uses[edges.of_half] == 1]
     if len(rim) != len(np.unique(rim[:, 0])):
-        return vertices, faces  # openings that touch in a point: no telling which rim goes where
+        return vertices, faces  # openings touch in a point, so it is unclear which rim goes where
     following = dict(zip(rim[:, 0].tolist(), rim[:, 1].tolist(), strict=True))
     width = _MAX_HOLE * float(np.ptp(vertices, axis=0).max())
     for loop in _loops(following):
@@ -123,7 +129,7 @@ def _face_volumes(vertices: Vertices, faces: Faces) -> NDArray[np.float64]:
 
 
 def _adjacency(faces: Faces) -> tuple[csr_matrix, csr_matrix]:
-    """Faces that share an edge of two, `(F, F)`; the same with 2 where the two disagree and 1 elsewhere."""
+    """Two matrices `(F, F)` over pairs of faces that share an edge: ones; and 2 where the two disagree, 1 elsewhere."""
     edges = mesh_edges(faces)
     order = np.argsort(edges.of_half, kind="stable")
     order = order[edges.uses[edges.of_half[order]] == 2].reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""A shape: what the hands sense of an object. Built once from a closed mesh, cached on disk by its content."""
+"""Shapes: what the hands sense of objects, built once from a closed mesh and cached on disk by its content."""
 
 import os
 from dataclasses import dataclass
@@ -28,26 +28,26 @@ from manipnet.synthesis.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES,
 
 _CACHE_VERSION = f"1-{RESOLUTION}"
 PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
-"""Shapes of the demo's objects, so that a first start need not compile what builds them."""
+"""The shapes of the demo's objects, so that a first start need not compile the code that builds them."""
 
 
 class Solid(NamedTuple):
-    """What kernels know of a shape."""
+    """A shape as an argument of kernels."""
 
     bvh: Bvh
     field: Field
     exact_within_m: float
-    """Distance in the object's own metres below which the sensors refine the field exactly."""
+    """The sensors compute distances below this, in the object's own metres, exactly instead of from the field."""
     center_of_mass: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """An object's geometry in its own frame, metres, at scale 1, with the queries the sensors and the solver make."""
+    """The geometry of an object in its own frame, metres, at scale 1, with the queries of sensors and solvers."""
 
     mesh: ClosedMesh
     bvh: Bvh
-    """Of the mesh, or of a simpler one nearly the same (`simplify`)."""
+    """The tree over the mesh, or over a reduced mesh that is nearly the same (`simplify`)."""
     field: Field
     center_of_mass: Array
     """`(3,)`, for uniform density."""
@@ -57,12 +57,12 @@ class Shape:
 
     @property
     def name(self) -> str:
-        """Name of the mesh it was built from."""
+        """The name of the mesh."""
         return self.mesh.name
 
     @property
     def content_hash(self) -> str:
-        """Hash of the geometry."""
+        """The hash of the geometry."""
         return self.mesh.content_hash
 
     @property
@@ -72,7 +72,7 @@ class Shape:
 
     @cached_property
     def reach_m(self) -> float:
-        """No part of it is farther than this from the origin of its frame, metres at scale 1."""
+        """Upper bound of the distance from the origin of its frame to any of its points, metres at scale 1."""
         return float(np.linalg.norm(np.abs(self.bounds).max(axis=0)))
 
     @cached_property
@@ -82,12 +82,12 @@ class Shape:
 
     @cached_property
     def solid(self) -> Solid:
-        """What kernels know of it."""
+        """The shape as an argument of kernels."""
         return Solid(self.bvh, self.field, EXACT_WITHIN_CELLS * self.field.cell_m, self.center_of_mass)
 
     @cached_property
     def rays(self) -> RayScene:
-        """Ray scene, made on first use."""
+        """The ray scene, which is made on first use."""
         return ray_scene(self.bvh)
 
     def distance(self, p_object: tuple[float, float, float]) -> float:
@@ -95,25 +95,28 @@ class Shape:
         return _distance(self.solid, *p_object)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Exact distances of `points (N, 3)` in the object's frame: signed `(N,)`, negative inside; unit directions
-        away from the surface `(N, 3)`; closest surface points `(N, 3)`."""
+        """Exact distances of `points (N, 3)` in the object's frame.
+
+        Returns signed distances `(N,)`, negative inside, unit directions away from the surface `(N, 3)`, and the
+        closest points of the surface `(N, 3)`.
+        """
         points = np.ascontiguousarray(points, dtype=np.float64)
         distance, normal = np.empty(len(points)), np.empty((len(points), 3))
         _signed_distances(self.bvh, self.field, points, np.inf, distance, normal)
         return distance, normal, points - distance[:, None] * normal
 
     def trace(self, origins: Array, directions: Array) -> Array:
-        """Distance `(N,)` along unit `directions (N, 3)` to the first hit, `inf` without one."""
+        """Distance `(N,)` along unit `directions (N, 3)` to the first hit, `inf` without a hit."""
         return self.rays.trace(origins, directions)[0]
 
 
 @kernel
-def _distance(solid, x, y, z):
+def _distance(solid: Solid, x: float, y: float, z: float):
     return signed_distance(solid.bvh, solid.field, x, y, z, np.inf)[0]
 
 
 @kernel
-def _signed_distances(bvh, field, points, exact_within_m, distance, normal):
+def _signed_distances(bvh: Bvh, field: Field, points: Array, exact_within_m: float, distance: Array, normal: Array):
     for i in range(len(points)):
         d, x, y, z = signed_distance(bvh, field, points[i, 0], points[i, 1], points[i, 2], exact_within_m)
         distance[i], normal[i, 0], normal[i, 1], normal[i, 2] = d, x, y, z
@@ -130,7 +133,7 @@ def load_shape(mesh: Path | str, unit: str = "m", scale: float = 1.0, name: str 
 
 
 def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
-    """Build a shape, or read it from the cache (`MANIPNET_CACHE`, else the user's cache folder)."""
+    """Build a shape, or read it from the cache folder: `cache_dir`, else `MANIPNET_CACHE`, else the user's."""
     folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
     path = folder / cache_name(mesh)
     parts = read_cached(path) or read_cached(PREBUILT_FOLDER / path.name)
@@ -145,6 +148,6 @@ def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
 
 
 def cache_name(mesh: ClosedMesh) -> str:
-    """File name of a mesh's shape in any cache folder."""
+    """The name of the file with a mesh's shape in a cache folder."""
     fewer = f"-{FEWER_TRIANGLES}" if len(mesh.faces) > MOST_TRIANGLES else ""
     return f"{mesh.content_hash[:32]}-{_CACHE_VERSION}{fewer}.npz"
