@@ -17,8 +17,6 @@ from manipnet.synthesis.objects.mesh import FORMATS
 from manipnet.synthesis.objects.units import UNITS_M
 
 NONES: Final[tuple[str, ...]] = ("none",)
-
-
 MAX_PROBLEM: Final = 600
 """Characters of a problem with a mesh file that are shown."""
 
@@ -79,9 +77,7 @@ class ObjectsTab:
         if self._body.options != bodies:
             self._body.options = bodies
             self._show_body()
-        elif (
-            self._carried.get(self._body.value) != self._shown
-        ):  # changed by a dropped file, the gizmo or another client
+        elif self._carried.get(self._body.value) != self._shown:  # a dropped file, the gizmo or a client changed it
             self._show_body()
 
     def follow(self, frame: Frame | None) -> None:
