@@ -43,7 +43,7 @@ class ObjectsTab:
             "Drag to move", False, hint="show arrows and rings in the scene that move the object on its body"
         )
         self._stand = gui.add_button(
-            "It stands on the sheet",
+            "The object is on the sheet",
             icon=viser.Icon.ARROW_BAR_TO_DOWN,
             hint="measure the position of the object on its body while the prop stands upright on the sheet's centre",
         )
