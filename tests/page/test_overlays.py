@@ -14,7 +14,7 @@ from manipnet.config.settings import default_actor
 from manipnet.geometry import invert, mirror_points, quat_to_matrix, transform
 from manipnet.page.frames import Frame, ShapeView
 from manipnet.page.hand_models import world_bones
-from manipnet.page.sensor_snapshot import Senser
+from manipnet.page.sensor_snapshot import SensorViews
 from manipnet.page.supervisor import frame_of
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
@@ -69,24 +69,24 @@ def frames(prop: Prop, tiny_bundle: Path, tmp_path_factory: pytest.TempPathFacto
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_layers_are_where_the_hand_of_their_tick_is(frames: list[Frame], prop: Prop, side) -> None:
     mesh = prop.shape.mesh
-    view = ShapeView(prop.object, prop.shape.content_hash, mesh.vertices, mesh.faces)
-    senser = Senser(HAND)
+    shape = ShapeView(prop.object, prop.shape.content_hash, mesh.vertices, mesh.faces)
+    views = SensorViews(HAND)
     for frame in frames:
-        hand, senses = frame.message.hands[side], senser.sense(frame, side, view, PROP_SIZE)
-        sensors = place_sensors(side, hand.angles, hand.wrist)
-        points, targets = (transform(senses.wrist, local) for local in (senses.points, senses.targets))
-        np.testing.assert_allclose(points, sensors, atol=1e-6)
-        np.testing.assert_allclose(senses.wrist, hand.wrist)
-        np.testing.assert_allclose(senses.raw[0], 0.0, atol=1e-9)
+        hand, sensors = frame.message.hands[side], views.view(frame, side, shape, PROP_SIZE)
+        on_skin = place_sensors(side, hand.angles, hand.wrist)
+        points, targets = (transform(sensors.wrist, local) for local in (sensors.points, sensors.targets))
+        np.testing.assert_allclose(points, on_skin, atol=1e-6)
+        np.testing.assert_allclose(sensors.wrist, hand.wrist)
+        np.testing.assert_allclose(sensors.raw[0], 0.0, atol=1e-9)
         joints = world_bones(HAND, side, HAND_SIZE, hand.angles, hand.wrist)[0]
         assert np.linalg.norm(targets - joints, axis=1).max() < 0.25
-        assert np.linalg.norm(senses.cells.mean(axis=0)) == pytest.approx(
+        assert np.linalg.norm(sensors.cells.mean(axis=0)) == pytest.approx(
             HAND_SIZE * np.linalg.norm(HAND.sensors.grid_center), abs=1e-9
         )
         T_object_world = invert(next(body.pose for body in frame.message.bodies if body.name == "Box"))
-        hits = np.abs(senses.readings) < 0.9 * HAND_SIZE * SENSOR_RANGE_M
+        hits = np.abs(sensors.readings) < 0.9 * HAND_SIZE * SENSOR_RANGE_M
         assert hits.any()
-        ends = transform(senses.wrist, senses.points + senses.readings[:, None] * senses.normals)
+        ends = transform(sensors.wrist, sensors.points + sensors.readings[:, None] * sensors.normals)
         ends = transform(T_object_world, ends)[hits]
         distance, *_ = prop.shape.signed_distance(ends / PROP_SIZE)
         assert np.abs(PROP_SIZE * distance).max() < 1e-3

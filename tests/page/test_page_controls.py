@@ -151,7 +151,7 @@ def test_an_object_is_chosen_sized_and_placed(studio: Studio) -> None:
     studio.page.tick("Drag to move")
     (kept,) = tomllib.loads(studio.rig.read_text())["objects"]
     np.testing.assert_allclose(kept["position"], [0.0, 0.04, 0.0])
-    studio.page.click("It stands on the sheet")
+    studio.page.click("The object is on the sheet")
     placed = studio.until(lambda message: abs(pose_of(message, "Box")[0]) < 1e-6)
     np.testing.assert_allclose(pose_of(placed, "Box")[2:], [0.0, 0.0, 0.0, 0.0, 1.0], atol=1e-6)
 

@@ -59,7 +59,7 @@ class Plots:
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._rate = _chart(gui, "Hands per second, last 30 s", (("hands/s", "#58a6ff"),), (0.0, 80.0))
-        self._delay = _chart(gui, "Work per tick, ms", (("packet to hands", "#f2a65a"),))
+        self._delay = _chart(gui, "Processing per tick, ms", (("packet to hands", "#f2a65a"),))
         colors = (("sense", "#7ee787"), ("network", "#d2a8ff"), ("IK", "#ff7b72"))
         self._stages = _chart(gui, "Stages, ms", colors)
 

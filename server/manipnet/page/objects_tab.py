@@ -17,8 +17,6 @@ from manipnet.synthesis.objects.mesh import FORMATS
 from manipnet.synthesis.objects.units import UNITS_M
 
 NONES: Final[tuple[str, ...]] = ("none",)
-
-
 MAX_PROBLEM: Final = 600
 """Characters of a problem with a mesh file that are shown."""
 
@@ -45,7 +43,7 @@ class ObjectsTab:
             "Drag to move", False, hint="show arrows and rings in the scene that move the object on its body"
         )
         self._stand = gui.add_button(
-            "It stands on the sheet",
+            "The object is on the sheet",
             icon=viser.Icon.ARROW_BAR_TO_DOWN,
             hint="measure the position of the object on its body while the prop stands upright on the sheet's centre",
         )
@@ -79,9 +77,7 @@ class ObjectsTab:
         if self._body.options != bodies:
             self._body.options = bodies
             self._show_body()
-        elif (
-            self._carried.get(self._body.value) != self._shown
-        ):  # changed by a dropped file, the gizmo or another client
+        elif self._carried.get(self._body.value) != self._shown:  # a dropped file, the gizmo or a client changed it
             self._show_body()
 
     def follow(self, frame: Frame | None) -> None:

@@ -10,7 +10,7 @@ from manipnet.geometry import Array
 from manipnet.page.frames import Frame, PropView, ShapeView
 from manipnet.page.hand_models import HandModel, wxyz
 from manipnet.page.prop_models import PropModels
-from manipnet.page.sensor_snapshot import Senser, Senses
+from manipnet.page.sensor_snapshot import SensorView, SensorViews
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.sensing.ambient import CELL_M, CELL_OFFSETS_M
 from manipnet.synthesis.sensing.scene import SENSOR_RANGE_M
@@ -24,13 +24,14 @@ OVERLAYS: Final = {
     "ghost": "Future pose",
 }
 """The overlays by name, with their labels."""
-SENSED: Final = ("ambient", "proximity", "contacts", "targets")
+OF_SENSORS: Final = frozenset({"ambient", "proximity", "contacts", "targets"})
+"""Overlays that need a sensor view."""
 CONTACT_M: Final = 0.004
 """A sensor within this distance of the surface counts as a contact."""
 
 NEAR, FAR = np.array([255.0, 92.0, 60.0]), np.array([70.0, 140.0, 255.0])
 AMBIENT_COLOR: Final = (255, 190, 80)
-TOUCH_COLOR: Final = (255, 72, 40)
+CONTACT_COLOR: Final = (255, 72, 40)
 TARGET_COLOR: Final = (80, 255, 160)
 OCCUPIED: Final = 0.3
 """A cell is drawn if at least this share of it is inside the object."""
@@ -41,65 +42,65 @@ PATH_COLOR: Final = (140, 190, 255)
 class HandOverlays:
     """The sensors, contacts and targets of one hand, under `name`.
 
-    They hang on its wrist: browsers move what hangs together at once, and take in new points when they find the time.
+    They are children of the wrist, because browsers move a node and its children at once, but draw new points later.
     """
 
     def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
-        sensors, joints = hand.sensor_count, hand.joint_count
+        sensor_count, joint_count = hand.sensor_count, hand.joint_count
         self._wrist = scene.add_frame(name, show_axes=False)
         self._ambient = _points(scene, f"{name}/ambient", len(CELL_OFFSETS_M), 0.35 * CELL_M, AMBIENT_COLOR)
         self._rays = scene.add_line_segments(
             f"{name}/rays",
-            np.zeros((sensors, 2, 3)),
-            np.zeros((sensors, 2, 3), np.uint8),
+            np.zeros((sensor_count, 2, 3)),
+            np.zeros((sensor_count, 2, 3), np.uint8),
             thickness=1.5,
             thickness_units="screen",
         )
-        self._points = _points(scene, f"{name}/sensors", sensors, 0.0035)
-        self._touches = _points(scene, f"{name}/contacts", sensors, 0.009, TOUCH_COLOR)
-        self._raw = _points(scene, f"{name}/raw", joints, 0.004, RAW_COLOR)
-        self._targets = _points(scene, f"{name}/targets", joints, 0.007, TARGET_COLOR)
-        self._aims = scene.add_line_segments(
-            f"{name}/aims", np.zeros((joints, 2, 3)), TARGET_COLOR, thickness=2.0, thickness_units="screen"
+        self._points = _points(scene, f"{name}/sensors", sensor_count, 0.0035)
+        self._contacts = _points(scene, f"{name}/contacts", sensor_count, 0.009, CONTACT_COLOR)
+        self._raw = _points(scene, f"{name}/raw", joint_count, 0.004, RAW_COLOR)
+        self._targets = _points(scene, f"{name}/targets", joint_count, 0.007, TARGET_COLOR)
+        self._target_lines = scene.add_line_segments(
+            f"{name}/target_lines", np.zeros((joint_count, 2, 3)), TARGET_COLOR, thickness=2.0, thickness_units="screen"
         )
 
-    def show(self, senses: Senses | None, shown: set[str]) -> None:
-        """Draw the overlays in `shown`; without senses, hide all of them."""
-        shown = shown if senses is not None else set()
+    def show(self, sensors: SensorView | None, shown: set[str]) -> None:
+        """Draw the overlays in `shown`; without a sensor view, hide all of them."""
+        shown = shown if sensors is not None else set()
         self._ambient.visible = "ambient" in shown
         self._rays.visible = self._points.visible = "proximity" in shown
-        self._touches.visible = "contacts" in shown
-        self._raw.visible = self._targets.visible = self._aims.visible = "targets" in shown
-        if senses is None:
+        self._contacts.visible = "contacts" in shown
+        self._raw.visible = self._targets.visible = self._target_lines.visible = "targets" in shown
+        if sensors is None:
             return
-        self._wrist.position, self._wrist.wxyz = senses.wrist[:3], wxyz(senses.wrist[3:])
+        self._wrist.position, self._wrist.wxyz = sensors.wrist[:3], wxyz(sensors.wrist[3:])
         if "ambient" in shown:
-            self._show_ambient(senses)
+            self._show_ambient(sensors)
         if "proximity" in shown:
-            self._show_proximity(senses)
+            self._show_proximity(sensors)
         if "contacts" in shown:
-            # what does not touch hides inside the first point that does, so the number of points never changes
-            near = np.abs(senses.readings) < CONTACT_M
-            self._touches.visible = bool(near.any())
+            # the other points are moved into the first contact, because the number of points must not change
+            near = np.abs(sensors.readings) < CONTACT_M
+            self._contacts.visible = bool(near.any())
             if near.any():
-                self._touches.points = _f32(np.where(near[:, None], senses.points, senses.points[near][0]))
+                self._contacts.points = _f32(np.where(near[:, None], sensors.points, sensors.points[near][0]))
         if "targets" in shown:
-            self._raw.points, self._targets.points = _f32(senses.raw), _f32(senses.targets)
-            self._aims.points = _f32(np.stack([senses.raw, senses.targets], axis=1))
+            self._raw.points, self._targets.points = _f32(sensors.raw), _f32(sensors.targets)
+            self._target_lines.points = _f32(np.stack([sensors.raw, sensors.targets], axis=1))
 
-    def _show_ambient(self, senses: Senses) -> None:
-        full = senses.ambient > OCCUPIED
+    def _show_ambient(self, sensors: SensorView) -> None:
+        full = sensors.ambient > OCCUPIED
         self._ambient.visible = bool(full.any())
         if full.any():
-            self._ambient.points = _f32(np.where(full[:, None], senses.cells, senses.cells[full][0]))
+            self._ambient.points = _f32(np.where(full[:, None], sensors.cells, sensors.cells[full][0]))
 
-    def _show_proximity(self, senses: Senses) -> None:
-        nearness = 1.0 - np.clip(np.abs(senses.readings) / SENSOR_RANGE_M, 0.0, 1.0)[:, None]
+    def _show_proximity(self, sensors: SensorView) -> None:
+        nearness = 1.0 - np.clip(np.abs(sensors.readings) / SENSOR_RANGE_M, 0.0, 1.0)[:, None]
         colors = np.round(FAR + nearness * (NEAR - FAR)).astype(np.uint8)
-        hit = (senses.readings < SENSOR_RANGE_M)[:, None]
-        ends = senses.points + np.where(hit, senses.readings[:, None], 0.0) * senses.normals
-        self._points.points, self._points.colors = _f32(senses.points), colors
-        self._rays.points = _f32(np.stack([senses.points, ends], axis=1))
+        hit = (sensors.readings < SENSOR_RANGE_M)[:, None]
+        ends = sensors.points + np.where(hit, sensors.readings[:, None], 0.0) * sensors.normals
+        self._points.points, self._points.colors = _f32(sensors.points), colors
+        self._rays.points = _f32(np.stack([sensors.points, ends], axis=1))
         self._rays.colors = np.repeat(colors[:, None], 2, axis=1)
 
 
@@ -146,7 +147,7 @@ class ActorOverlays:
     """All overlays of one actor, under `name`."""
 
     def __init__(self, scene: viser.SceneApi, name: str, hand: Hand) -> None:
-        self._scene, self._name, self._hand, self._senser = scene, name, hand, Senser(hand)
+        self._scene, self._name, self._hand, self._sensor_views = scene, name, hand, SensorViews(hand)
         self._hands: dict[Side, HandOverlays] = {}
         self._ghost = Ghost(scene, f"{name}/ghost", hand)
 
@@ -155,20 +156,20 @@ class ActorOverlays:
         self._ghost.show(frame, shapes, "ghost" in shown)
         props = {prop.name: prop for prop in frame.props}
         for side in ("left", "right"):
-            senses = self._senses(frame, side, props, shapes) if shown & set(SENSED) else None
-            if senses is not None and side not in self._hands:
+            sensors = self._view(frame, side, props, shapes) if shown & OF_SENSORS else None
+            if sensors is not None and side not in self._hands:
                 self._hands[side] = HandOverlays(self._scene, f"{self._name}/{side}", self._hand)
             if side in self._hands:
-                self._hands[side].show(senses, shown)
+                self._hands[side].show(sensors, shown)
 
-    def _senses(
+    def _view(
         self, frame: Frame, side: Side, props: dict[str, PropView], shapes: dict[str, ShapeView]
-    ) -> Senses | None:
+    ) -> SensorView | None:
         hand = frame.hands.get(side)
         prop = None if hand is None else props.get(hand.prop)
         if prop is None or prop.content_hash not in shapes or side not in frame.message.hands:
             return None
-        return self._senser.sense(frame, side, shapes[prop.content_hash], prop.scale)
+        return self._sensor_views.view(frame, side, shapes[prop.content_hash], prop.scale)
 
 
 def _f32(values: np.ndarray) -> NDArray[np.float32]:

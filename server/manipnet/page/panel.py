@@ -173,4 +173,4 @@ def _health(status: dict[str, Any]) -> str:
 
 
 def _ago(age_s: float) -> str:
-    return f"{1e3 * age_s:.0f} ms" if age_s < 1.0 else f"{age_s:.0f} s ago"
+    return f"{1e3 * age_s:.0f} ms ago" if age_s < 1.0 else f"{age_s:.0f} s ago"

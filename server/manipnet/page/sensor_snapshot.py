@@ -1,7 +1,7 @@
-"""What a hand senses and aims for at a tick, computed for display in the page's process with the network's kernels.
+"""The sensors and inverse-kinematics targets of a hand at a tick, computed for display in the page's process.
 
-The sensors are those of the hand as it is shown. The network's own were on the pose it went on from, a tick before and
-without its grip: they would be up to a centimetre beside the fingers.
+The sensors are placed on the hand as it is shown. Those of the network were placed on its feedback pose, from the tick
+before and without all of the last correction, and would be drawn up to a centimetre away from the fingers.
 """
 
 from dataclasses import dataclass
@@ -20,30 +20,36 @@ from manipnet.wire import Side
 
 
 @dataclass(frozen=True, eq=False)
-class Senses:
-    """One hand's, in the frame of its `wrist (7,)`: occupancy `ambient (1000,)` of `cells (1000, 3)`; sensor `points`,
-    `normals (104, 3)` and `readings (104,)` in metres; joints before `raw (22, 3)` and `targets (22, 3)` of inverse
-    kinematics."""
+class SensorView:
+    """Sensors of one hand in the frame of its wrist, metres."""
 
     wrist: Array
+    """`(7,)` in the world."""
     cells: Array
+    """`(1000, 3)` centres of the ambient sensor's cells."""
     ambient: np.ndarray
+    """`(1000,)` occupancy of the cells, 0 to 1."""
     points: Array
+    """`(S, 3)` positions of the proximity sensors."""
     normals: Array
+    """`(S, 3)` directions of the proximity sensors."""
     readings: Array
+    """`(S,)` distances to the surface that they read."""
     raw: Array
+    """`(J, 3)` joints before inverse kinematics."""
     targets: Array
+    """`(J, 3)` targets of inverse kinematics."""
 
 
-class Senser:
-    """Computes snapshots; each shape is built, or read from the cache, once."""
+class SensorViews:
+    """Computes sensor views. Each shape is built, or read from the cache, once."""
 
     def __init__(self, hand: Hand) -> None:
         self._hand = hand
         self._shapes: dict[str, Shape] = {}
 
-    def sense(self, frame: Frame, side: Side, view: ShapeView, prop_scale: float) -> Senses:
-        """The snapshot of one hand and the shape of its prop."""
+    def view(self, frame: Frame, side: Side, shape: ShapeView, prop_scale: float) -> SensorView:
+        """The sensors of one hand, beside the shape of its prop."""
         hand, shown = frame.hands[side], frame.message.hands[side]
         size, positions, rotations = shown.scale, *forward_kinematics(self._hand, np.asarray(shown.angles, np.float64))
         wrist, obj = (
@@ -55,7 +61,7 @@ class Senser:
             wrist, obj = mirror_poses(wrist), mirror_poses(obj)
         local = take_snapshot(
             self._hand,
-            self._shape(view),
+            self._built(shape),
             wrist,
             obj,
             mirrored,
@@ -66,25 +72,25 @@ class Senser:
             hand.distances,
         )
 
-        def real(points: Array) -> Array:
+        def actual(points: Array) -> Array:
             return size * (mirror_points(points) if mirrored else points)
 
-        return Senses(
+        return SensorView(
             np.asarray(shown.wrist, np.float64),
-            real(self._hand.sensors.grid_center + CELL_OFFSETS_M),
+            actual(self._hand.sensors.grid_center + CELL_OFFSETS_M),
             local.ambient,
-            real(local.points),
-            real(local.normals) / size,
+            actual(local.points),
+            actual(local.normals) / size,
             local.readings * size,
-            real(hand.raw_positions),
-            real(local.targets),
+            actual(hand.raw_positions),
+            actual(local.targets),
         )
 
-    def _shape(self, view: ShapeView) -> Shape:
-        if view.content_hash not in self._shapes:
-            mesh = ClosedMesh(view.name, view.vertices, view.faces, view.content_hash)
-            self._shapes[view.content_hash] = build_shape(mesh)
-        return self._shapes[view.content_hash]
+    def _built(self, shape: ShapeView) -> Shape:
+        if shape.content_hash not in self._shapes:
+            mesh = ClosedMesh(shape.name, shape.vertices, shape.faces, shape.content_hash)
+            self._shapes[shape.content_hash] = build_shape(mesh)
+        return self._shapes[shape.content_hash]
 
 
 def _present(frame: Frame, name: str) -> Array:
