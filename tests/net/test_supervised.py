@@ -9,9 +9,9 @@ import time
 import msgpack
 import pytest
 import zmq
+from live_server import PATIENCE_S
 from osc_writer import bundle, osc
 
-from conftest import PATIENCE_S
 from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.service import Control
 from manipnet.inputs.osc import OSC
