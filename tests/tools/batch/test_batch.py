@@ -55,7 +55,7 @@ def check_results(out: Path) -> None:
     takes = summary(out)
     states = {name: take["state"] for name, take in takes.items()}
     assert states == {"a": "done", "day2_b": "done", "short": "failed", "other": "failed", "broken": "failed"}
-    assert "more than 1 s" in takes["short"]["reason"]
+    assert "must be longer than 1 s" in takes["short"]["reason"]
     assert takes["other"]["reason"] == "no --mesh: at least one of the take's objects needs a mesh (Hat)"
     assert takes["broken"]["reason"].startswith("is not a CSV export of Motive")
     assert sorted(path.name for path in out.glob("*.npz")) == ["a.npz", "day2_b.npz"]
