@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from manipnet_tools.bench.sections import USUAL
+from manipnet_tools.bench.options import USUAL
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 

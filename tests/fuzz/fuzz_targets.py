@@ -20,7 +20,8 @@ from manipnet.inputs.natnet.protocol import read_echo, read_packet, read_server_
 from manipnet.inputs.osc.assembler import FrameAssembler
 from manipnet.inputs.osc.packet import split_packet
 from manipnet.recording.mcap_file import RecordingError
-from manipnet.synthesis.model.bundle import BundleError, load_bundle
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import BundleError
 from manipnet.wire.bodies import MessageError, parse_bodies
 
 VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5)]

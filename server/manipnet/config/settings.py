@@ -181,15 +181,20 @@ def default_actor(objects: tuple[ObjectConfig, ...] = ()) -> ActorConfig:
 
 
 def parse_object(text: str) -> ObjectConfig:
-    """The prop of `NAME=FILE`: the body NAME carries the mesh FILE, or the mesh of that name in the library.
+    """The prop of `--mesh NAME=FILE`: the body NAME carries the mesh FILE. Raises `ConfigError`."""
+    name, mesh = parse_mesh(text)
+    return ObjectConfig(name, BodyConfig(int(name) if name.isdecimal() else name), mesh)
+
+
+def parse_mesh(text: str) -> tuple[str, Path]:
+    """A name and a mesh file from `NAME=FILE`, where FILE may also be the name of an object of the library.
 
     Raises `ConfigError`.
     """
-    name, equals, file = text.partition("=")
-    if not (name and equals and file):
-        raise ConfigError(f"{text!r} is not NAME=FILE, for example Box=meshes/mug.obj or Box=mug")
-    mesh = Path(file) if Path(file).is_file() else library_file(file) or Path(file)
-    return ObjectConfig(name, BodyConfig(int(name) if name.isdecimal() else name), mesh)
+    name, _, file = text.partition("=")
+    if not (name and file):
+        raise ConfigError(f"--mesh {text}: must be NAME=FILE, for example Box=meshes/mug.obj or Box=mug")
+    return name, Path(file) if Path(file).is_file() else library_file(file) or Path(file)
 
 
 def check(config: ServerConfig) -> None:

@@ -46,6 +46,11 @@ class ChildProcess:
         except Exception as error:
             self._error = error
 
+    @property
+    def exit_code(self) -> int | None:
+        """Its exit status, or the negative number of the signal that ended it; None while it runs."""
+        return self._process.exitcode
+
     def close(self, timeout_s: float | None = None) -> None:
         """Close the pipe and wait for the end of the child, at most `timeout_s`."""
         self.connection.close()

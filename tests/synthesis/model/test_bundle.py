@@ -12,9 +12,9 @@ from other_hands import three_fingered
 from tiny_bundle import write_tiny_bundle
 
 from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
-from manipnet.synthesis.model.bundle import NETWORK_FILE, BundleError, load_bundle, write_bundle
+from manipnet.synthesis.model.bundle import NETWORK_FILE, load_bundle, write_bundle
 from manipnet.synthesis.model.layout import layout_of
-from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet.synthesis.model.shipped import BundleError, shipped_hand
 
 HAND = shipped_hand()
 LAYOUT = layout_of(HAND)

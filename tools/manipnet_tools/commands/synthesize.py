@@ -10,7 +10,6 @@ from rich.progress import Progress
 from manipnet.config.settings import WRISTS
 from manipnet.geometry import Array
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Synthesizer, hand_to_world
@@ -24,10 +23,6 @@ from manipnet_tools.terminal import open_console
 
 def run(options: SynthesizeOptions) -> None:
     """Synthesise and write. Raises `TakeError`, `ConfigError`, `MeshError`, `BundleError` and `OSError`."""
-    if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
-        raise TakeError(f"--look-ahead is {options.look_ahead:g} s; allowed are 0 to {MAX_LOOK_AHEAD_S:g}")
-    if not options.out.absolute().parent.is_dir():
-        raise TakeError(f"--out {options.out}: its folder does not exist; create it first")
     console = open_console()
     with console.status("loading take, meshes and model"):
         rig = read_rig(options.rig, options.actor)

@@ -10,7 +10,6 @@ import torch
 
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.layout import layout_of
-from manipnet_tools.takes.dataset import DataError, take_folders
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, Samples, load_captured_hands
 from manipnet_tools.training.model import ManipNet, normalisation
@@ -113,7 +112,5 @@ def trained(
 
 def run(options: TrainOptions) -> None:
     """Train and write the bundle. Raises `DataError`, `TakeError` and `MeshError`."""
-    names = [folder.name for folder in take_folders(options.data) if folder.name not in options.leave_out]
-    if not names:
-        raise DataError(f"--leave-out names every take of {options.data}; leave some to train on")
-    save_bundle(train(load_captured_hands(options.data, names), options.training, options.share), options.out)
+    hands = load_captured_hands(options.data, options.takes())
+    save_bundle(train(hands, options.training, options.share), options.out)
