@@ -1,4 +1,4 @@
-"""`manipnet synthesize`: fingers for a take, made offline by the synthesis of the live server."""
+"""`manipnet synthesize`: synthesises the fingers of a take offline, with the synthesis of the live server."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -52,7 +52,7 @@ def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands:
 
 
 def read_shapes(meshes: Sequence[str], take: Take, path: Path, rig: RigText | None = None) -> dict[str, Shape]:
-    """Shapes by body: of `meshes` (`NAME=FILE`), or else of the recording at `path`, or else of the rig.
+    """Shapes by body, from `meshes` (`NAME=FILE`), or else from the recording at `path`, or else from the rig.
 
     Raises `TakeError` and `MeshError`.
     """
@@ -64,7 +64,7 @@ def read_shapes(meshes: Sequence[str], take: Take, path: Path, rig: RigText | No
     if not files and rig is not None:
         files = {name: file for name, file in rig.meshes.items() if name in take.objects}
     if not files:
-        objects = ", ".join(take.objects) or "there are none"
+        objects = ", ".join(take.objects) or "it has none"
         raise TakeError(f"no --mesh: at least one of the take's objects needs a mesh ({objects})")
     return {
         name: build_shape(_centred(file.load()) if take.box_centred else file.load()) for name, file in files.items()

@@ -1,4 +1,4 @@
-"""Smaller model files: weights in half precision, cast on load; and 8-bit weights, in wide layers 4-bit ones."""
+"""Makes model files smaller: half-precision weights that are cast on load, or 8-bit weights, 4-bit in wide layers."""
 
 import numpy as np
 import onnx
@@ -10,9 +10,9 @@ from manipnet_tools.training.options import QuantiseOptions
 _LEAST_VALUES = 4096
 """Smaller tensors (biases, normalisation) keep full precision."""
 _BLOCK = 32
-"""Neighbouring weights, or activations, that share a scale; with 64 and 128 idle hands tremble more."""
+"""Number of neighbouring weights, or activations, that share a scale. With 64 or 128, idle hands tremble more."""
 _WIDE = 1024
-"""Matrices of at least this size in both directions can take 4 bits; with them the narrow network errs a tenth more."""
+"""Matrices of at least this size in both directions have 4 bits. With 4 bits, the narrow network errs a tenth more."""
 
 
 def halve_weights(content: bytes) -> bytes:

@@ -1,4 +1,4 @@
-"""`manipnet train`: from captured takes to a bundle."""
+"""`manipnet train`: trains a model on captured takes, and writes a bundle."""
 
 import logging
 import time
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class Trainer:
-    """One model in training: it learns round by round, at a falling rate."""
+    """Trains one model, round by round, at a falling learning rate."""
 
     def __init__(self, hand: Hand, first: Samples, config: TrainConfig) -> None:
         """The normalisation is taken from the `first` samples."""
@@ -41,7 +41,7 @@ class Trainer:
 
     @property
     def model(self) -> ManipNet:
-        """The model that would be shipped now."""
+        """The model as it would be shipped now."""
         return cast(ManipNet, self._average.module) if self._config.weight_average else self._last
 
     def learn(self, samples: Samples) -> float:
@@ -77,8 +77,8 @@ class Trainer:
 def train(hands: Sequence[CapturedHand], config: TrainConfig, share: float = 1.0) -> Trained:
     """Train on the first `share` of each take.
 
-    The result is the same for the same seed. It takes one thread, because with the small batches that train best a
-    second thread waits more than it works.
+    The same seed gives the same result. Training uses one thread, because with the small batches that train best, a
+    second thread mostly waits.
     """
     started = time.monotonic()
     torch.set_num_threads(1)
@@ -104,7 +104,7 @@ def trained(
     share: float,
     seconds: float,
 ) -> Trained:
-    """The model as it is now, with what a bundle needs besides."""
+    """The model as it is now, with everything else that a bundle needs."""
     takes = tuple(sorted({captured.name.split("/")[0] for captured in hands}))
     model, rest_angles, limits = trainer.model.eval(), sampler.rest_angles, sampler.limits
     return Trained(model, sampler.hand, rest_angles, limits, config, takes, share, seconds)

@@ -1,4 +1,4 @@
-"""A trained model, and the bundle that is made of it."""
+"""A trained model, and how it becomes a bundle."""
 
 from dataclasses import asdict, dataclass
 from datetime import date
@@ -18,7 +18,7 @@ LICENCE = "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye,
 
 @dataclass(frozen=True, eq=False)
 class Trained:
-    """A trained model with what a bundle needs besides."""
+    """A trained model with everything else that a bundle needs."""
 
     model: ManipNet
     hand: Hand
