@@ -1,8 +1,8 @@
-"""Checks the folder in which numba keeps compiled code: numba ends the program when it meets a file that is cut.
+"""Checks the folder in which numba keeps compiled code: numba crashes when it reads a file that was cut off.
 
-A manifest holds the SHA-256 of every file, and is written when everything is compiled. What has changed since, which
-another process may have added rightly, gets a light check: numba's files are pickles, so the first and the last byte of
-one that is whole are known. Nothing is unpickled here.
+A manifest holds the SHA-256 of every file, and is written when everything is compiled. A file that has
+changed since, perhaps because another process added it, gets a lighter check: numba's files are pickles, so the first and
+the last byte of a whole one are known. Nothing is unpickled here.
 """
 
 import hashlib

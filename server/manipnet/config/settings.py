@@ -160,7 +160,7 @@ def protocol_options() -> tuple[type, ...]:
 
 
 def input_options() -> tuple[Option, ...]:
-    """The options of all inputs, for whatever else receives tracked bodies."""
+    """The options of all inputs, for other programs that receive tracked bodies."""
     return tuple(each for declared in inputs.INPUTS for each in options_of(declared.options))
 
 

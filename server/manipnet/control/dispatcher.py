@@ -1,4 +1,4 @@
-"""What is done with a request: decoded, met by the handler of its operation, answered in its own encoding.
+"""Handles requests: each is decoded, passed to the handler of its operation, and answered in its own encoding.
 
 Operations that may take seconds (a mesh is built, a process starts) run on a thread for each kind, so that `pause`
 never waits for them.
@@ -40,7 +40,7 @@ Reply = Callable[[bytes], object]
 
 
 class Dispatcher:
-    """Meets requests with `handlers`, one per operation. `submit` may be called from any thread."""
+    """Passes requests to `handlers`, one per operation. `submit` may be called from any thread."""
 
     def __init__(self, handlers: Mapping[str, Handler], telemetry: Telemetry) -> None:
         self._handlers, self._telemetry = handlers, telemetry
@@ -49,9 +49,9 @@ class Dispatcher:
         self._lock = threading.Lock()
 
     def submit(self, parts: list[bytes], reply: Reply, here: bool = True) -> None:
-        """Meet one message, whatever it holds, and give the answer to `reply`: at once, or later for a slow operation.
+        """Handle one message, whatever it contains, and pass the answer to `reply`: at once, or later for a slow operation.
 
-        `here` tells whether the message comes from this machine.
+        `here` says whether the message comes from this machine.
         """
         as_json = bool(parts) and parts[0].lstrip()[:1] in (b"{", b"[")
 
@@ -83,7 +83,7 @@ class Dispatcher:
             answer({"error": f"{op} must wait: {MAX_WAITING} requests of its kind are being met; try again later"}, op)
 
     def close(self) -> None:
-        """Let the threads end as soon as they have met the request they are at."""
+        """Let the threads end after their current request."""
         with self._lock:
             for waiting in self._waiting.values():
                 with contextlib.suppress(queue.Empty):

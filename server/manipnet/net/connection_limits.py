@@ -54,12 +54,12 @@ class _Connection:
 
 
 class Connections:
-    """The open connections, as the socket's events tell. One thread calls everything but `delivered` and `len`."""
+    """The open connections, as the socket's events report them. One thread calls everything but `delivered` and `len`."""
 
     def __init__(
         self, most: int, refuse: Refuse, curve: bool = False, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`most` connections are admitted. `curve` tells that the handshake is CURVE's, not NULL's."""
+        """`most` connections are admitted. `curve` says whether the handshake is CURVE's or NULL's."""
         self._most, self._refuse, self._clock = most, refuse, clock
         self._curve = curve
         self._port = 0
@@ -180,7 +180,7 @@ class Connections:
         return ""
 
     def _traffic(self, descriptor: int, connection: _Connection) -> tuple[int, int]:
-        """All bytes that were received and acknowledged, or those from before if the system does not tell."""
+        """All bytes that were received and acknowledged, or the number from before if the system does not report it."""
         if sys.platform == "linux":
             with self._borrowed(descriptor) as tcp:
                 if tcp is not None:

@@ -1,4 +1,4 @@
-"""A function in a process of its own, with a pipe to it.
+"""Runs a function in a process of its own, with a pipe to it.
 
 The child starts from a fresh interpreter, so that it shares no locks and no threads with the server. It ignores SIGINT:
 a Ctrl-C in a terminal reaches every process there, but it is for the server, which then ends its children. If the

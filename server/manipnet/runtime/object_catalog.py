@@ -16,7 +16,7 @@ from manipnet.synthesis.objects.shape import Shape
 
 MAX_FOLDER_FILES: Final = 1000
 MAX_UNUSED: Final = 16
-"""Shapes that are kept although nobody may carry them: those that were asked for last."""
+"""How many shapes are kept that no prop carries: those that were requested last."""
 _log = logging.getLogger(__name__)
 
 
@@ -33,7 +33,7 @@ class ObjectCatalog:
     """Shapes of the rig, of the user's `folder` and of the library. Thread-safe.
 
     A shape is built on the thread that first asks for it. It is kept while it is in use, and while it is among the
-    `MAX_UNUSED` that were asked for last. An object that a client has added is forgotten with its shape.
+    `MAX_UNUSED` that were requested last. An object that a client has added is forgotten with its shape.
 
     If two objects have the same name, the rig's comes before the folder's, and the folder's before the library's.
     """
@@ -162,7 +162,7 @@ class ObjectCatalog:
         return shape
 
     def _keep(self, shape: Shape) -> None:
-        """Note that a shape was asked for; the one for which nobody has asked for longest may go instead."""
+        """Note that a shape was requested; the one that was requested longest ago may go instead."""
         if shape in self._newest:
             self._newest.remove(shape)
         self._newest.append(shape)
