@@ -139,7 +139,7 @@ class Actor:
         kept = {prop.name for prop in self.config.objects} | {hand.prop for hand in self.hands.values()}
         free = [prop.name for prop in self.props if prop.name not in kept]
         if not free:
-            raise ValueError(f"{self.config.name} has {MAX_OBJECTS} props already, which are of the rig or held")
+            raise ValueError(f"{self.config.name} already has {MAX_OBJECTS} props, all of them in the rig or held")
         name = next((name for name in free if name not in self._tracked), free[0])
         self.props = [prop for prop in self.props if prop.name != name]
         self._roles.forget(name)

@@ -1,8 +1,8 @@
 """Checks the folder in which numba keeps compiled code: numba crashes when it reads a file that was cut off.
 
 A manifest holds the SHA-256 of every file, and is written when everything is compiled. A file that has
-changed since, perhaps because another process added it, gets a lighter check: numba's files are pickles, so the first and
-the last byte of a whole one are known. Nothing is unpickled here.
+changed since, perhaps because another process added it, gets a lighter check: numba's files are pickles, so the first
+and the last byte of a whole one are known. Nothing is unpickled here.
 """
 
 import hashlib

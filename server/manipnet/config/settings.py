@@ -117,7 +117,7 @@ class ServerConfig:
     control_port: int = option(5557, Port(), "TCP port for control requests (ZeroMQ REP)", group=SERVER)
     page_port: int = option(8080, Port(), "TCP port of the live page (HTTP and WebSocket)", group=SERVER)
     metrics_port: int | None = option(
-        None, Port(), "TCP port of metrics for Prometheus (HTTP); without it, there are none", group=SERVER
+        None, Port(), "TCP port of metrics for Prometheus (HTTP); by default no metrics are served", group=SERVER
     )
     keys: Path | None = option(
         None, Folder(), "let only clients with keys connect over ZeroMQ; `manipnet keys` makes the keys", group=SERVER

@@ -80,7 +80,7 @@ class Dispatcher:
         except RequestError as error:
             answer({"error": str(error)}, op)
         except queue.Full:
-            answer({"error": f"{op} must wait: {MAX_WAITING} requests of its kind are being met; try again later"}, op)
+            answer({"error": f"{op} cannot start: {MAX_WAITING} requests of its kind are waiting; try again later"}, op)
 
     def close(self) -> None:
         """Let the threads end after their current request."""
@@ -113,7 +113,7 @@ def _work(waiting: "queue.Queue[Callable[[], None] | None]") -> None:
         try:
             task()
         except Exception:
-            _log.exception("control: an answer could not be given")
+            _log.exception("control: an answer could not be sent")
 
 
 def _decode(parts: list[bytes]) -> Request:

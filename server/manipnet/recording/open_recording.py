@@ -95,7 +95,7 @@ class OpenRecording:
             reason = self._answer().get("error", "its process has ended")
             self.problem = (
                 f"{self.path.name} has ended early ({reason}); what was written until then is kept, and "
-                f"`manipnet recover {self.path}` makes a whole recording of it"
+                f"`manipnet recover {self.path}` repairs it"
             )
             self.is_broken = True
             _log.error("the recording %s; the session goes on", self.problem)

@@ -123,7 +123,7 @@ def open_session(
     sizes = [node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())]
     expected = [layout.input_size, layout.output_size]
     if sizes != expected:
-        raise BundleError(f"{path}: takes and gives {sizes} numbers; expected are {expected}")
+        raise BundleError(f"{path}: has {sizes} inputs and outputs; expected are {expected}")
     return session
 
 
