@@ -49,7 +49,7 @@ class Dispatcher:
         self._lock = threading.Lock()
 
     def submit(self, parts: list[bytes], reply: Reply, here: bool = True) -> None:
-        """Handle one message, whatever it contains, and pass the answer to `reply`: at once, or later for a slow operation.
+        """Handle one message, whatever it contains. Pass the answer to `reply`, later if the operation is slow.
 
         `here` says whether the message comes from this machine.
         """
@@ -74,9 +74,9 @@ class Dispatcher:
                     'may ask; add "store": false to let the result be in force until the server stops'
                 )
             if op not in SLOW_OPS:
-                answer(self._meet(op, request), op)
+                answer(self._answer_to(op, request), op)
                 return
-            self._queue(SLOW_OPS[op]).put_nowait(lambda: answer(self._meet(op, request), op))
+            self._queue(SLOW_OPS[op]).put_nowait(lambda: answer(self._answer_to(op, request), op))
         except RequestError as error:
             answer({"error": str(error)}, op)
         except queue.Full:
@@ -98,7 +98,7 @@ class Dispatcher:
                 threading.Thread(target=_work, args=(self._waiting[name],), name=f"control-{name}", daemon=True).start()
             return self._waiting[name]
 
-    def _meet(self, op: str, request: Request) -> dict[str, Any]:
+    def _answer_to(self, op: str, request: Request) -> dict[str, Any]:
         try:
             return self._handlers[op](request)
         except RequestError as error:

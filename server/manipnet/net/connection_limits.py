@@ -54,7 +54,7 @@ class _Connection:
 
 
 class Connections:
-    """The open connections, as the socket's events report them. One thread calls everything but `delivered` and `len`."""
+    """The open connections, as the socket's events report. One thread calls everything but `delivered` and `len`."""
 
     def __init__(
         self, most: int, refuse: Refuse, curve: bool = False, clock: Callable[[], float] = time.monotonic
