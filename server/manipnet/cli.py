@@ -25,6 +25,7 @@ from manipnet.config.settings import (
     parse_object,
     server_config,
 )
+from manipnet.runtime.address_space import check_address_space
 
 EPILOG = """examples:
   manipnet-serve --demo                                   play a recorded performance, over and over
@@ -83,6 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(describe(config), end="")
             return 0
         check(config)
+        check_address_space()
     except ConfigError as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
