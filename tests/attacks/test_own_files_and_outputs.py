@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from live_server import PATIENCE_S, START_S, free_ports
+from live_server import PATIENCE_S, START_S, free_ports, serving
 
 OPTIONS = ("--mesh", "日本=hammer")
 """A prop that is not among those whose shapes come with the program."""
@@ -69,6 +69,25 @@ def test_a_name_that_the_output_cannot_show_ends_nothing(tiny_bundle: Path, tmp_
     lines = [server.stdout.readline() for _ in range(3)]
     assert all(lines)
     end(server)
+
+
+def test_a_name_that_the_system_cannot_write_is_refused_by_its_reason(tiny_bundle: Path, tmp_path: Path) -> None:
+    ascii_only = {"LANG": "C", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    takes = tmp_path / "takes"
+    with serving("--model", str(tiny_bundle), "--takes", str(takes), environment=ascii_only) as server:
+        for request in ({"op": "record", "name": "Übung"}, {"op": "add_object", "file": str(tmp_path / "Würfel.ply")}):
+            error = server.ask(request)["error"]
+            assert "this system cannot write" in error
+            assert "PYTHONUTF8=1" in error
+        assert server.ask({"op": "record", "name": "Uebung"})["name"] == "Uebung.mcap"
+        assert "error" not in server.ask({"op": "stop_recording"})
+
+
+def test_takes_are_listed_although_one_is_a_link_to_nowhere(tiny_bundle: Path, tmp_path: Path) -> None:
+    (tmp_path / "lost.mcap").symlink_to(tmp_path / "nowhere.mcap")
+    (tmp_path / "whole.mcap").touch()
+    with serving("--model", str(tiny_bundle), "--takes", str(tmp_path)) as server:
+        assert server.ask({"op": "recordings"})["recordings"] == ["whole.mcap", "lost.mcap"]
 
 
 def test_a_closed_pipe_leaves_the_log_alive(tiny_bundle: Path, tmp_path: Path) -> None:
