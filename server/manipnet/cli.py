@@ -25,7 +25,7 @@ from manipnet.config.settings import (
     parse_object,
     server_config,
 )
-from manipnet.runtime.address_space import check_address_space
+from manipnet.runtime.memory import check_address_space, share_arenas
 
 EPILOG = """examples:
   manipnet-serve --demo                                   play a recorded performance, over and over
@@ -122,6 +122,7 @@ def describe(config: ServerConfig) -> str:
 
 
 def _serve(config: ServerConfig, json_log: bool) -> int:
+    share_arenas()
     from manipnet.runtime.precompile import Precompiler
 
     precompiler = Precompiler()
