@@ -51,6 +51,16 @@ def test_what_an_output_cannot_show_is_escaped(monkeypatch, tmp_path):
         assert r"\u2192 one" in errors.read_text(encoding="cp1252")
 
 
+def test_no_text_controls_the_terminal(monkeypatch, tmp_path):
+    with outputs(monkeypatch, tmp_path) as (read, errors):
+        console = Console()
+        console.say("a\x1b[31m\r\x07b\x9bc\td")
+        log(console, "x\x1b]0;title\x07")
+        console.close()
+        assert os.read(read, 4096) == b"a\\x1b[31m\\x0d\\x07b\\x9bc\td" + os.linesep.encode()
+        assert "x\\x1b]0;title\\x07" in errors.read_text()
+
+
 def test_a_closed_output_leaves_the_log_alive_and_is_reported_once(monkeypatch, tmp_path):
     with outputs(monkeypatch, tmp_path) as (read, errors):
         os.close(read)
