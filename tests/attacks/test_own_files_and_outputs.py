@@ -46,15 +46,35 @@ def kernels(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return folder
 
 
+def _empty(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def _keep_one_byte(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:1])
+
+
+def _keep_half(file: Path) -> None:
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+
+
+def _put_a_folder_in_its_place(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+DAMAGES = (_empty, _keep_one_byte, _keep_half, _put_a_folder_in_its_place)
+
+
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc", ".npz"])
 def test_a_cut_cache_is_rebuilt_and_reported(kernels: Path, tiny_bundle: Path, tmp_path: Path, suffix: str) -> None:
     cache = tmp_path / "cache"
     shutil.copytree(kernels, cache)
     files = sorted(cache.rglob(f"*{suffix}"))
     assert files, f"the cache holds no {suffix}"
-    for file, kept in zip(files, (0.0, 0.5), strict=False):  # a few, since all of it takes long to compile
-        content = file.read_bytes()
-        file.write_bytes(content[: int(kept * len(content))])
+    for file, damage in zip(files, DAMAGES, strict=False):  # a few, since all of it takes long to compile
+        damage(file)
     server = start(tmp_path, tiny_bundle, MANIPNET_CACHE=str(cache))
     wait_ready(server)
     _, errors = end(server)
