@@ -1,7 +1,7 @@
 """Run the measurements of docs/reliability.md one after another, and print the load before each.
 
-`python -m benchmarks.reliability.everything` runs all but the soak and the fuzz tests, in about 50 minutes. Names choose
-some of them; those marked with * measure milliseconds, so nothing else may run on the machine meanwhile.
+`python -m benchmarks.reliability.everything` runs all but the soak and the fuzz tests, in about 50 minutes. Names
+choose some of them; those marked with * measure milliseconds, so nothing else may run on the machine meanwhile.
 """
 
 import argparse
