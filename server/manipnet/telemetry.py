@@ -28,6 +28,7 @@ BODY_REASONS = (
     "nan",
     "bounds",
     "zero_quaternion",
+    "conflict",  # two bodies have the same id or name
     "frozen",  # tracked, but bit-identical for too long
     "jump",  # farther from the last sample than a body can move
     "swap",  # two bodies in each other's place from one frame to the next

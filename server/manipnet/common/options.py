@@ -208,6 +208,8 @@ class Option:
     def _converted(self, convert: Callable[[], Any], value: Any, where: str) -> Any:
         try:
             return convert()
+        except ConfigError as error:  # the kind knows better what is wrong
+            raise ConfigError(f"{where} {error}") from None
         except ValueError:
             raise ConfigError(f"{where} is {shorten(value)}; it must be {self.kind.allowed}") from None
 

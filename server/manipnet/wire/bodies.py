@@ -23,8 +23,10 @@ _FLOATS = {float}
 _FAR = MAX_COORDINATE_M
 _SMALLEST, _LARGEST = 1e-12, 1e12  # limits of a quaternion's squared length, beyond which it gives no rotation
 
-FAULTS = ("nan", "bounds", "zero_quaternion")
-"""Why a pose cannot be used: a number is not finite, the position is out of bounds, or there is no rotation."""
+CONFLICT = "conflict"
+FAULTS = ("nan", "bounds", "zero_quaternion", CONFLICT)
+"""Why a pose cannot be used: a number is not finite, the position is out of bounds, there is no rotation, or two bodies
+have the same id or name."""
 
 
 class MessageError(ValueError):
@@ -59,6 +61,10 @@ class BodyFrame:
     bodies: tuple[BodySample, ...]
     t_received_s: float
     source: str
+    timecode: str | None = None
+    """The SMPTE timecode of the instant, HH:MM:SS:FF, if the sender gives one."""
+    timecode_rate: float | None = None
+    """The timecode's frames per second, if the sender gives it."""
 
 
 def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
