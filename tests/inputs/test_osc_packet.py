@@ -24,6 +24,7 @@ from manipnet.inputs.osc.packet import (
 from manipnet.wire.bodies import MessageError
 from manipnet.wire.text import read_text
 
+CYRILLIC = "\u042f\u0449\u0438\u043a"
 MESSAGE = b"/a\0\0,i\0\0\0\0\0\7"
 
 
@@ -132,7 +133,7 @@ def test_the_first_messages_of_a_bundle_that_is_too_large_are_read():
         ("あ".encode("shift_jis"), (), "あ"),
         ("手".encode("shift_jis"), (), "Žè"),  # the bytes do not tell
         ("手".encode("shift_jis"), ("手",), "手"),
-        ("Куб".encode("cp1251"), ("Куб", 3), "Куб"),
+        (CYRILLIC.encode("cp1251"), (CYRILLIC, 3), CYRILLIC),
         ("Łuk".encode("cp1250"), (), "Łuk"),
         (b"\xff\xfe", (), "ÿþ"),
     ],

@@ -16,7 +16,7 @@ more."""
 STEP_S: Final = 1e-4
 """A clock that advances by less than this from one frame to the next stands still."""
 MOVING_SHARE: Final = 0.6
-"""The share of the frames at which a clock must advance. The others may come in the wrong order."""
+"""The share of the frames at which a clock must step. A clock of coarse steps is the same at the others."""
 JUMP_S: Final = 0.5
 """A clock that steps by this much more or less than ours was set, wrapped around, or has another unit."""
 MUCH_TOO_SLOW: Final = 0.02
@@ -49,15 +49,15 @@ class Clock:
         """How many frames in a row have stated it."""
         self.needs = 1
         """How many frames in a row must have stated it before it may be used."""
-        self._last_s = self._newest_s = self._noted_s = self._begun_s = self._begun_at_s = self._still_since_s = 0.0
+        self._last_s = self._noted_s = self._begun_s = self._begun_at_s = self._still_since_s = 0.0
         self._noted = False
-        self._frames = self._advances = self._still = self._jumps = self._bad = self._good = 0
+        self._frames = self._steps = self._still = self._jumps = self._bad = self._good = 0
 
     def note(self, t_s: float, now_s: float) -> None:
         """Take the time that a frame states, and judge."""
         if not self._noted:
             self._noted = True
-            self._last_s = self._newest_s = t_s
+            self._last_s = t_s
             self._noted_s = self._still_since_s = now_s
             self._begin(t_s, now_s)
             return
@@ -71,18 +71,15 @@ class Clock:
             self._still += 1
         else:
             self._still, self._still_since_s = 0, now_s
+            self._steps += 1
         if not -JUMP_S < step_s - elapsed_s < JUMP_S:
-            self._newest_s = t_s
             self._jump(t_s, now_s, step_s)
             return
         self._jumps = 0
-        if t_s >= self._newest_s + STEP_S:  # a frame in the wrong order does not advance the clock
-            self._newest_s = t_s
-            self._advances += 1
         self._judge(now_s)
 
     def _begin(self, t_s: float, now_s: float) -> None:
-        self._begun_s, self._begun_at_s, self._frames, self._advances = t_s, now_s, 0, 0
+        self._begun_s, self._begun_at_s, self._frames, self._steps = t_s, now_s, 0, 0
 
     def _jump(self, t_s: float, now_s: float, step_s: float) -> None:
         """A clock may jump once, when it was set or has wrapped around; one that jumps at every frame is none."""
@@ -95,9 +92,13 @@ class Clock:
         elapsed_s, passed_s = now_s - self._begun_at_s, self._last_s - self._begun_s
         if self._still >= STILL_FRAMES and now_s - self._still_since_s >= STILL_S:
             self._condemn("stands still")
-        elif self.runs is None and self._frames >= STILL_FRAMES and elapsed_s >= 2.0 * STILL_S:
-            if passed_s < MUCH_TOO_SLOW * elapsed_s:
-                self._condemn(_speed(passed_s / elapsed_s))
+        elif (
+            self.runs is None
+            and self._frames >= STILL_FRAMES
+            and elapsed_s >= 0.5 * WINDOW_S
+            and passed_s < MUCH_TOO_SLOW * elapsed_s
+        ):
+            self._condemn(_speed(passed_s / elapsed_s))
         if elapsed_s < WINDOW_S or self._frames < STILL_FRAMES:
             return
         speed = passed_s / elapsed_s
@@ -105,7 +106,7 @@ class Clock:
             self._bad += 1
             if self._bad > 1:
                 self._condemn(_speed(speed))
-        elif self._advances < MOVING_SHARE * self._frames:
+        elif self._steps < MOVING_SHARE * self._frames:
             self._bad += 1
             if self._bad > 1:
                 self._condemn("advances in steps that are longer than a frame")
@@ -114,7 +115,7 @@ class Clock:
             self._good += 1
             if self.runs is None or self._good > 1:
                 self.runs, self.fault = True, ""
-        self._begin(self._newest_s, now_s)
+        self._begin(self._last_s, now_s)
 
     def _condemn(self, fault: str) -> None:
         self.runs, self.fault, self._good = False, fault, 0
