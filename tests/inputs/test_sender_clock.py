@@ -1,6 +1,7 @@
 """The clocks of a sender: which of them is believed, and when."""
 
 import random
+from itertools import pairwise
 
 import pytest
 
@@ -114,7 +115,7 @@ def test_a_clock_that_is_no_longer_stated_is_forgotten_only_when_asked():
 
 def test_arrivals_in_bunches_are_spread_by_the_usual_interval():
     _, times = drive(lambda t_s: None, arrive=lambda t_s: (int(t_s * HZ) // 3 + 1) * 3 / HZ)
-    steps = [b - a for (_, a), (_, b) in zip(times[6:], times[7:], strict=False)]
+    steps = [b - a for (_, a), (_, b) in pairwise(times[6:])]
     assert min(steps) > 0.5 / HZ
     assert max(steps) < 2.0 / HZ
     assert all(t_s <= 50.0 + sent_s + 0.1 for sent_s, t_s in times)

@@ -7,8 +7,8 @@ for `STANDS_S`.
 
 from typing import Any, Final
 
-from manipnet.inputs.osc.reader import BodyKey
 from manipnet.inputs.osc.patterns import EULER, POSITION, QUATERNION
+from manipnet.inputs.osc.reader import BodyKey
 from manipnet.inputs.osc.space import Converter, Numbers
 from manipnet.wire.bodies import CONFLICT, MAX_BODIES, MAX_NAME_CHARS, BodySample, make_sample
 
