@@ -88,6 +88,10 @@ class HandsMessage:
     bodies: tuple[BodyPose, ...] = ()
     latency_ms: Latency = Latency()
     v: int = VERSION
+    timecode: str | None = None
+    """SMPTE timecode HH:MM:SS:FF of the instant (";" before FF for drop frame), if the tracker sends one."""
+    timecode_rate: float | None = None
+    """The timecode's frames per second, if it is known."""
 
 
 Record = list[tuple[str, np.dtype]]
@@ -117,6 +121,9 @@ PREAMBLE: Final = np.dtype(
 """The beginning of every binary message, in all versions."""
 
 LATENCY: Final = np.dtype(RECORDS[Latency])
-HEADER: Final = np.dtype([*PREAMBLE.descr, *RECORDS[HandsMessage], ("latency_ms", LATENCY)], align=True)
+_HEADER: Final = [*PREAMBLE.descr, *RECORDS[HandsMessage], ("latency_ms", LATENCY)]
+HEADER: Final = np.dtype(_HEADER, align=True)
+TIMED_HEADER: Final = np.dtype([*_HEADER, ("timecode", NAME), ("timecode_rate", "<f4")], align=True)
+"""The header of a message that has a timecode. A rate of zero means that it is not known."""
 HAND: Final = np.dtype([("side", "u1"), ("has_object", "u1"), *RECORDS[HandPose]], align=True)
 BODY: Final = np.dtype(RECORDS[BodyPose], align=True)
