@@ -121,9 +121,20 @@ PREAMBLE: Final = np.dtype(
 """The beginning of every binary message, in all versions."""
 
 LATENCY: Final = np.dtype(RECORDS[Latency])
-_HEADER: Final = [*PREAMBLE.descr, *RECORDS[HandsMessage], ("latency_ms", LATENCY)]
-HEADER: Final = np.dtype(_HEADER, align=True)
-TIMED_HEADER: Final = np.dtype([*_HEADER, ("timecode", NAME), ("timecode_rate", "<f4")], align=True)
+HEADER: Final = np.dtype([*PREAMBLE.descr, *RECORDS[HandsMessage], ("latency_ms", LATENCY)], align=True)
+_TIMECODE: Final = np.dtype([("timecode", NAME), ("timecode_rate", "<f4"), ("reserved", "V4")])
+TIMED_HEADER: Final = np.dtype(
+    {
+        "names": [*(HEADER.names or ()), *(_TIMECODE.names or ())],
+        "formats": [kind for part in (HEADER, _TIMECODE) for kind, *_ in (part.fields or {}).values()],
+        "offsets": [
+            start + offset
+            for start, part in ((0, HEADER), (HEADER.itemsize, _TIMECODE))
+            for _, offset, *_ in (part.fields or {}).values()
+        ],
+        "itemsize": HEADER.itemsize + _TIMECODE.itemsize,
+    }
+)
 """The header of a message that has a timecode. A rate of zero means that it is not known."""
 HAND: Final = np.dtype([("side", "u1"), ("has_object", "u1"), *RECORDS[HandPose]], align=True)
 BODY: Final = np.dtype(RECORDS[BodyPose], align=True)
