@@ -96,7 +96,13 @@ def definitions(names, version, skeletons=None):
     kinds = [
         (0, b"Box\0" + struct.pack("<i", 2) + b"one\0two\0"),
         *(
-            (2, name.encode() + b"\0" + struct.pack("<ii", id, len(bones)) + b"".join(body(*each) for each in bones.items()))
+            (
+                2,
+                name.encode()
+                + b"\0"
+                + struct.pack("<ii", id, len(bones))
+                + b"".join(body(*each) for each in bones.items()),
+            )
             for id, (name, bones) in skeletons.items()
         ),
         (3, struct.pack("<i", 1) + b"SN1\0" + bytes(4 * (2 + 3 + 144 + 12 + 2)) + channels),

@@ -22,7 +22,7 @@ SOON_MS: Final = 20
 """When to look again after a handshake has succeeded."""
 _LOG_PERIOD_S: Final = 5.0
 _REFUSED: Final = {
-    "handshake": "a client that has the wrong keys, or that does not speak ZMTP 3",
+    "handshake": "a client that does not speak ZMTP 3{keys}, or whose socket is not a {peer} socket",
     "socket_type": "a client whose socket has the wrong type (a PUSH, for example): use a {peer} socket that connects here",
     "not_listed": "a client whose key is not in clients.allow",
     "too_many": "a client, since too many are connected or in the handshake",
@@ -57,6 +57,7 @@ class AccessControl:
         self._answer = open_door if keys is None else ClientList(keys).answer
         self.connections = Connections(most, self._refuse, curve=keys is not None)
         self._peer = _PEERS.get(socket.type, "matching")
+        self._keys = "" if keys is None else ", that has the wrong keys"
         self._log_throttle = LogThrottle(_LOG_PERIOD_S)
         if keys is not None:
             secure_server(socket, keys)
@@ -141,4 +142,4 @@ class AccessControl:
     def _refuse(self, reason: str) -> None:
         self._telemetry.count("connections_refused", reason=reason)
         if self._log_throttle.admit(reason) is not None:
-            _log.warning("refused (%s) %s", reason, _REFUSED[reason].format(peer=self._peer))
+            _log.warning("refused (%s) %s", reason, _REFUSED[reason].format(peer=self._peer, keys=self._keys))
