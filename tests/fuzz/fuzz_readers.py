@@ -14,7 +14,8 @@ from osc_writer import bundle, osc
 
 from manipnet.common.options import ConfigError
 from manipnet.config.rig_reader import load_rig
-from manipnet.inputs.natnet.frames import read_body_names, read_frame
+from manipnet.inputs.natnet.definitions import read_definitions
+from manipnet.inputs.natnet.frames import read_frame
 from manipnet.inputs.natnet.protocol import read_echo, read_packet, read_server_info
 from manipnet.inputs.osc.assembler import FrameAssembler
 from manipnet.inputs.osc.packet import split_packet
@@ -74,7 +75,7 @@ def _natnet(data: bytes) -> object:
         case 1:
             return read_server_info(payload)
         case 5:
-            return read_body_names(payload, version)
+            return read_definitions(payload, version)
         case 7:
             return read_frame(payload, version)
         case 13:
