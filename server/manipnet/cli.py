@@ -26,6 +26,7 @@ from manipnet.config.settings import (
     parse_object,
     server_config,
 )
+from manipnet.runtime.memory import check_address_space, share_arenas
 from manipnet.synthesis.model.shipped import BundleError
 
 EPILOG = """examples:
@@ -86,6 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 0
         check(config)
         check_files(config)
+        check_address_space()
     except (ConfigError, BundleError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
@@ -123,6 +125,7 @@ def describe(config: ServerConfig) -> str:
 
 
 def _serve(config: ServerConfig, json_log: bool) -> int:
+    share_arenas()
     from manipnet.runtime.precompile import Precompiler
 
     precompiler = Precompiler()

@@ -28,6 +28,7 @@ BODY_REASONS = (
     "nan",
     "bounds",
     "zero_quaternion",
+    "conflict",  # two bodies have the same id or name
     "frozen",  # tracked, but bit-identical for too long
     "jump",  # farther from the last sample than a body can move
     "swap",  # two bodies in each other's place from one frame to the next
@@ -45,7 +46,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "bodies_rejected": ("reason", BODY_REASONS),
     "sender_restarts": ("source", ()),
     "receiver_restarts": ("source", ()),
-    "connections_refused": ("reason", ("handshake", "not_listed", "too_many", "endless")),
+    "connections_refused": ("reason", ("handshake", "socket_type", "not_listed", "too_many", "endless")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),

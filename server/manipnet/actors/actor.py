@@ -17,6 +17,7 @@ from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene, HandState
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import TICK_S, BodyAtTick, BodyHealth, Tick
+from manipnet.tracking.timecodes import Timecode, Timecodes
 from manipnet.tracking.timeline import Timeline
 from manipnet.wire import SIDES, Side, State
 from manipnet.wire.bodies import BodyFrame
@@ -45,6 +46,7 @@ class Actor:
         }
         self._telemetry = telemetry
         self._roles, self._timeline = BodyRoles(config), Timeline(look_ahead_s)
+        self._timecodes = Timecodes()
         self._last: tuple[int, int] | None = None
         self._tracked: frozenset[str] = frozenset()
         """The roles whose bodies were tracked at the newest tick."""
@@ -83,11 +85,17 @@ class Actor:
         poses = self._roles.poses(frame)
         if not poses:
             return "unknown_body"
+        if frame.timecode is not None:
+            self._timecodes.note(frame.t_s, frame.timecode, frame.timecode_rate)
         restarts = self._timeline.restarts
         reason = self._timeline.push(frame.t_s, poses, frame.t_received_s, frame.source)
         if self._timeline.restarts > restarts:
             self._telemetry.count("sender_restarts", source=frame.source.partition(":")[0])
         return reason
+
+    def timecode(self, t_s: float) -> Timecode:
+        """The timecode of an instant of stream time, as far as the tracker sends one."""
+        return self._timecodes.at(t_s)
 
     def poll(self, now_s: float) -> Tick | None:
         """The next tick that is due at `now_s`, or None. Call this again until it returns None."""

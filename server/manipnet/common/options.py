@@ -160,6 +160,37 @@ class HostPort(Kind):
         return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
+@dataclass(frozen=True)
+class Endpoints(Kind):
+    """Addresses of other programs, each with its port."""
+
+    scheme: str
+    repeatable = True
+
+    @property
+    def metavar(self) -> str:
+        return f"{self.scheme}://HOST:PORT"
+
+    @property
+    def allowed(self) -> str:
+        return f"addresses of the form {self.scheme}://HOST:PORT with a port of 1 … 65535"
+
+    def read(self, value: Any, folder: Path) -> tuple[Endpoint, ...]:
+        texts = _require(value, isinstance(value, list) and all(isinstance(text, str) for text in value))
+        return tuple(self._endpoint(text) for text in texts)
+
+    def _endpoint(self, text: str) -> Endpoint:
+        scheme, found, rest = text.partition("://")
+        host, port = _split_endpoint(rest if found else text, 0)
+        return _require((host, port), port > 0 and scheme in ((self.scheme,) if found else (text,)))
+
+    def write(self, value: tuple[Endpoint, ...]) -> list[str]:
+        return [
+            f"{self.scheme}://[{host}]:{port}" if ":" in host else f"{self.scheme}://{host}:{port}"
+            for host, port in value
+        ]
+
+
 class Networks(Kind):
     """Addresses and networks."""
 
@@ -208,6 +239,8 @@ class Option:
     def _converted(self, convert: Callable[[], Any], value: Any, where: str) -> Any:
         try:
             return convert()
+        except ConfigError as error:  # the kind knows better what is wrong
+            raise ConfigError(f"{where} {error}") from None
         except ValueError:
             raise ConfigError(f"{where} is {shorten(value)}; it must be {self.kind.allowed}") from None
 

@@ -80,6 +80,10 @@ class ActorConfig:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Lower and upper limit, in radians, of some of `wire.hand_names.ANGLE_NAMES`; they narrow the model's limits."""
 
+    def bodies(self) -> dict[str, BodyConfig]:
+        """The body of each wrist and prop, by the name of the wrist or prop."""
+        return {**self.wrists, **{prop.name: prop.body for prop in self.objects}}
+
 
 @dataclass(frozen=True, slots=True)
 class ServerConfig:
@@ -148,6 +152,12 @@ class ServerConfig:
     def is_exposed(self) -> bool:
         """Whether machines that nobody has listed may connect, which only `insecure` allows."""
         return not is_loopback(self.host) and (self.keys is None or not self.allow)
+
+    @property
+    def body_keys(self) -> frozenset[BodyKey]:
+        """The bodies of all actors, by id or name."""
+        parts = (body for actor in self.actors for body in actor.bodies().values())
+        return frozenset(body.key for body in parts)
 
     def of(self, options: type[T]) -> T:
         """The options of one input or output, for example `config.of(OscOptions)`."""

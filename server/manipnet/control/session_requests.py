@@ -1,6 +1,7 @@
 """The requests about a running server. Handlers run on the control thread and reach the actors through the mailbox."""
 
 import base64
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,7 +11,17 @@ from manipnet import __version__
 from manipnet.actors.props import Prop
 from manipnet.config.settings import SCALE_RANGE
 from manipnet.control.actors_proxy import ActorsProxy
-from manipnet.control.request import Handler, Request, RequestError, body_key, choice, flag, number
+from manipnet.control.request import (
+    Handler,
+    Request,
+    RequestError,
+    body_key,
+    choice,
+    flag,
+    is_writable_name,
+    number,
+    quoted,
+)
 from manipnet.geometry import Array
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
@@ -121,6 +132,11 @@ class SessionRequests:
         file = request.get("file")
         if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH or "\0" in file:
             raise RequestError("file is missing or is not a path; give the path of a mesh on the server's machine")
+        if not is_writable_name(Path(file)):
+            raise RequestError(
+                f"file is {quoted(file)}, which this system cannot write in its encoding "
+                f"({sys.getfilesystemencoding()}); use ASCII letters, or start the server with PYTHONUTF8=1"
+            )
         try:
             shape = self._catalog.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))
         except MeshError as error:

@@ -36,7 +36,7 @@ _CURVE_BYTES: Final = _GREETING_BYTES + 170
 """What a CURVE server has sent before the handshake is complete: its greeting and WELCOME (RFC 26)."""
 
 Refuse = Callable[[str], None]
-"""Called with the reason why a connection was refused or closed: `handshake`, `too_many` or `endless`."""
+"""Called with the reason why a connection was refused or closed: `handshake`, `socket_type`, `too_many` or `endless`."""
 
 
 @dataclass(slots=True)
@@ -64,8 +64,9 @@ class Connections:
         self._curve = curve
         self._port = 0
         self._open: dict[int, _Connection] = {}
-        self._succeeded = self._denied = 0
-        """Handshakes that succeeded or were denied, of which it is not known yet to which connections they belong."""
+        self._succeeded = self._denied = self._let_in = 0
+        """Handshakes that succeeded, were denied, or got as far as a client that may connect, of which it is not known
+        yet to which connections they belong."""
         self._delivered: set[int] = set()
         self._admitted = 0
 
@@ -91,7 +92,12 @@ class Connections:
     def succeeded(self) -> None:
         """Note that the handshake of one of the connections is complete."""
         self._succeeded += 1
+        self._let_in = max(self._let_in - 1, 0)
         self.look()
+
+    def let_in(self) -> None:
+        """Note that a client that may connect is in the handshake. If it fails now, its socket has the wrong type."""
+        self._let_in += 1
 
     def denied(self) -> None:
         """Note that one of the connections was refused for its key, which the caller has counted."""
@@ -108,6 +114,9 @@ class Connections:
             self._succeeded -= 1
         elif self._denied:
             self._denied -= 1
+        elif self._let_in:
+            self._let_in -= 1
+            self._refuse("socket_type")
         else:
             self._refuse("handshake")
 

@@ -175,7 +175,8 @@ def bodies_of(message: HandsMessage) -> BodyFrame:
         BodySample(None, body.name, tuple(body.pose[:3].tolist()), tuple(body.pose[3:].tolist()), body.tracked)
         for body in message.bodies
     ]
-    return BodyFrame(message.t_capture, message.seq, tuple(bodies), message.t_publish, "hands")
+    timecode = message.timecode, message.timecode_rate
+    return BodyFrame(message.t_capture, message.seq, tuple(bodies), message.t_publish, "hands", *timecode)
 
 
 def read_about(path: Path | str) -> About:

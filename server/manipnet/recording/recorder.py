@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,14 +12,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from manipnet.actors.props import Prop
-from manipnet.control.request import Handler, Request, RequestError
+from manipnet.control.request import Handler, Request, RequestError, is_writable_name
 from manipnet.recording.open_recording import OpenRecording, RecordingFailedError
 from manipnet.telemetry import Telemetry
 
 NAME: Final = re.compile(r"\w([\w .-]{0,62}[\w-])?")
 MIN_FREE_BYTES: Final = 64 << 20
 """Space for a recording to begin: about a minute of one actor."""
-DEVICES: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)( *\..*)?", re.IGNORECASE)
+DEVICES: Final = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])( *\..*)?", re.IGNORECASE)
 """Names that stand for devices on Windows, whatever suffix they have."""
 
 About = Callable[[], tuple[dict[str, str], Sequence[Prop]]]
@@ -62,6 +63,11 @@ class Recorder:
         if DEVICES.fullmatch(name):
             raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
         path = self._folder / (name.removesuffix(".mcap") + ".mcap")
+        if not is_writable_name(path):
+            raise RequestError(
+                f"name is {name!r}, which this system cannot write in its encoding ({sys.getfilesystemencoding()}); "
+                "use ASCII letters, or start the server with PYTHONUTF8=1"
+            )
         with self._lock:
             if (recording := self._current()) is not None:
                 raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
@@ -105,12 +111,20 @@ class Recorder:
 
     def _recordings(self, _: Request) -> dict[str, Any]:
         recording = self._current()
-        files = sorted(self._folder.glob("*.mcap"), key=lambda path: path.stat().st_mtime, reverse=True)
+        files = sorted(self._folder.glob("*.mcap"), key=_changed_s, reverse=True)
         return {
             "folder": str(self._folder.resolve()),
             "recordings": [path.name for path in files],
             "recording": None if recording is None else {"name": recording.path.name, "seconds": recording.seconds},
         }
+
+
+def _changed_s(path: Path) -> float:
+    """When a file was changed last; 0 if it has just been deleted, or is a link to nowhere."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def carried_objects(props: Sequence[Prop]) -> str:

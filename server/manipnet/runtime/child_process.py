@@ -15,6 +15,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Final
 
+from manipnet.runtime.memory import share_arenas
+
 NICE: Final = 10
 """By how much the priority of a child is lower."""
 
@@ -64,6 +66,7 @@ class ChildProcess:
 
 def _run(target: Callable[..., None], connection: Connection, arguments: tuple[object, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    share_arenas()
     if hasattr(os, "nice") and sys.platform != "linux":
         os.nice(NICE)
     target(connection, *arguments)
