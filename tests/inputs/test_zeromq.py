@@ -156,6 +156,16 @@ def test_trackers_that_bind_are_connected_to(heard, telemetry, trackers, context
     receiver.stop()
 
 
+def bind_when_free(socket, port):
+    """Bind to a port whose former socket may still be closing."""
+    for _ in range(2_000):
+        try:
+            return socket.bind(f"tcp://127.0.0.1:{port}")
+        except zmq.ZMQError:
+            threading.Event().wait(0.01)
+    raise AssertionError("the port stays in use")
+
+
 def test_a_tracker_that_starts_late_and_restarts_is_found(heard, telemetry, context):
     with context.socket(zmq.XPUB) as probe:
         port = probe.bind_to_random_port("tcp://127.0.0.1")
@@ -165,7 +175,7 @@ def test_a_tracker_that_starts_late_and_restarts_is_found(heard, telemetry, cont
     for n in range(2):
         with context.socket(zmq.XPUB) as tracker:
             tracker.setsockopt(zmq.LINGER, 0)
-            tracker.bind(f"tcp://127.0.0.1:{port}")
+            bind_when_free(tracker, port)
             assert tracker.poll(20_000)
             tracker.recv()
             tracker.send(msgpack.packb(message(n)))
@@ -179,7 +189,7 @@ def test_a_push_socket_is_refused_as_the_wrong_type(receiver, telemetry, context
         push.connect(receiver.address)
         while "socket_type" not in telemetry.counts().get("connections_refused", {}):
             assert threading.Event().wait(0.02) is False
-    assert "a PUSH, for example): use a PUB socket that connects here" in caplog.text
+    assert "a PUSH, for example): use a PUB socket" in caplog.text
     assert "keys" not in caplog.text
 
 

@@ -92,19 +92,14 @@ def definitions(names, version, skeletons=None):
         data += struct.pack("<i", 2) + struct.pack("<6f", *range(6)) + struct.pack("<ii", 1, 2)
         return data + (b"Marker 1\0Marker 2\0" if version >= (4, 0) else b"")
 
+    def skeleton(id, name, bones):
+        written = b"".join(body(*each) for each in bones.items())
+        return name.encode() + b"\0" + struct.pack("<ii", id, len(bones)) + written
+
     channels = struct.pack("<i", 2) + b"Fx\0Fy\0"
     kinds = [
         (0, b"Box\0" + struct.pack("<i", 2) + b"one\0two\0"),
-        *(
-            (
-                2,
-                name.encode()
-                + b"\0"
-                + struct.pack("<ii", id, len(bones))
-                + b"".join(body(*each) for each in bones.items()),
-            )
-            for id, (name, bones) in skeletons.items()
-        ),
+        *((2, skeleton(id, *of)) for id, of in skeletons.items()),
         (3, struct.pack("<i", 1) + b"SN1\0" + bytes(4 * (2 + 3 + 144 + 12 + 2)) + channels),
         (4, struct.pack("<i", 1) + b"Glove\0SN2\0" + bytes(8) + channels),
         (5, b"Camera 1\0" + struct.pack("<7f", 0, 0, 0, 0, 0, 0, 1)),

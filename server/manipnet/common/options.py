@@ -185,10 +185,7 @@ class Endpoints(Kind):
         return _require((host, port), port > 0 and scheme in ((self.scheme,) if found else (text,)))
 
     def write(self, value: tuple[Endpoint, ...]) -> list[str]:
-        return [
-            f"{self.scheme}://[{host}]:{port}" if ":" in host else f"{self.scheme}://{host}:{port}"
-            for host, port in value
-        ]
+        return [f"{self.scheme}://{f'[{host}]' if ':' in host else host}:{port}" for host, port in value]
 
 
 class Networks(Kind):

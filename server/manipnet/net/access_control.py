@@ -4,7 +4,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import zmq
 from zmq.utils.monitor import parse_monitor_message
@@ -23,12 +23,12 @@ SOON_MS: Final = 20
 _LOG_PERIOD_S: Final = 5.0
 _REFUSED: Final = {
     "handshake": "a client that does not speak ZMTP 3{keys}, or whose socket is not a {peer} socket",
-    "socket_type": "a client whose socket has the wrong type (a PUSH, for example): use a {peer} socket that connects here",
+    "socket_type": "a client whose socket has the wrong type (a PUSH, for example): use a {peer} socket",
     "not_listed": "a client whose key is not in clients.allow",
     "too_many": "a client, since too many are connected or in the handshake",
     "endless": "a client that sends frames without end, but no message",
 }
-_PEERS: Final = {zmq.SUB: "PUB", zmq.PUB: "SUB", zmq.XPUB: "SUB", zmq.REP: "REQ", zmq.ROUTER: "REQ"}
+_PEERS: Final[dict[Any, str]] = {zmq.SUB: "PUB", zmq.PUB: "SUB", zmq.XPUB: "SUB", zmq.REP: "REQ", zmq.ROUTER: "REQ"}
 """The type of socket that may connect to a socket."""
 _EVENTS: Final = zmq.Event.LISTENING | zmq.Event.ACCEPTED | zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED
 _log = logging.getLogger(__name__)
@@ -56,7 +56,7 @@ class AccessControl:
         self._telemetry, self._failed = telemetry, failed
         self._answer = open_door if keys is None else ClientList(keys).answer
         self.connections = Connections(most, self._refuse, curve=keys is not None)
-        self._peer = _PEERS.get(socket.type, "matching")
+        self._peer = _PEERS.get(socket.getsockopt(zmq.TYPE), "matching")
         self._keys = "" if keys is None else ", that has the wrong keys"
         self._log_throttle = LogThrottle(_LOG_PERIOD_S)
         if keys is not None:

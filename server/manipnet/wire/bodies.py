@@ -156,7 +156,8 @@ def _decode(payload: bytes) -> Any:
         try:
             return msgpack.unpackb(payload, max_array_len=MAX_BODIES, max_map_len=MAX_BODIES)
         except UnicodeDecodeError:  # a name in another encoding
-            return _with_text(msgpack.unpackb(payload, raw=True, max_array_len=MAX_BODIES, max_map_len=MAX_BODIES))
+            raw: Any = {"raw": True, "max_array_len": MAX_BODIES, "max_map_len": MAX_BODIES}
+            return _with_text(msgpack.unpackb(payload, **raw))
     except (ValueError, TypeError, OverflowError, RecursionError, msgpack.UnpackException) as error:
         reason = str(error)[:120] or type(error).__name__
         raise MessageError(f"the message is neither a msgpack map nor a JSON object: {reason}") from None

@@ -1,6 +1,7 @@
 """Connects to trackers that bind a PUB socket, and reads their body messages on a thread of its own."""
 
 import threading
+from collections.abc import Mapping
 from typing import Any, Final
 
 import zmq
@@ -99,6 +100,6 @@ class TrackerConnections:
         except Exception:
             self._health.message_failed()
 
-    def _note(self, address: str, event: dict[str, Any]) -> None:
+    def _note(self, address: str, event: Mapping[str, Any]) -> None:
         with self._lock:
             self._connected[address] = event["event"] == zmq.Event.HANDSHAKE_SUCCEEDED
