@@ -26,7 +26,7 @@ def run(options: ReplayOptions) -> None:
     """Play to the end, or until stopped. Raises `TakeError`, `ConfigError` and `PlayError`."""
     if not SPEEDS[0] <= options.speed <= SPEEDS[1]:
         raise TakeError(f"--speed is {options.speed:g}; allowed are {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    take = read_take(options.take)
+    take = read_take(options.take, up=options.up)
     if options.rate is not None:
         take = resample(take, options.rate)
     frames = list(take_frames(take))
