@@ -1,4 +1,4 @@
-"""Mesh files as exporters write them: what is read is the surface that was meant, or the refusal gives the true reason."""
+"""Mesh files as exporters write them: they are read as the surface that was meant, or refused for the true reason."""
 
 import base64
 import json

@@ -241,8 +241,10 @@ def test_rotations_come_in_any_order(tmp_path: Path, order: str) -> None:
             "the number '0,000000' has a decimal comma; export the file with decimal",
         ),
         (
-            lambda text: text.partition("0.008333334")[0] + text.partition("MOTION")[2].replace(".", ","),
-            "decimal comma",
+            lambda text: "0.01".join(
+                part.replace(".", ",") if n else part for n, part in enumerate(text.split("0.008333334"))
+            ),
+            "the numbers have decimal commas; export the file with decimal points",
         ),
         (
             lambda text: text.replace("MOTION", "ROOT Table\n{\nOFFSET 0 0 0\n}\nMOTION"),
@@ -251,7 +253,7 @@ def test_rotations_come_in_any_order(tmp_path: Path, order: str) -> None:
         (lambda text: text.replace("MOTION", ""), "has no MOTION section"),
         (lambda text: text.replace("Xrotation", "Wrotation"), "'Wrotation' is unknown, allowed are Xposition"),
         (
-            lambda text: text.replace("0.000000\n", "0.000000 1\n"),
+            lambda text: text.replace(" 0.000000\n0.5", " 0.000000 1\n0.5"),
             r"frame 0 has 7 numbers; the channels of the hierarchy are 6",
         ),
         (lambda text: text.replace("Frame Time: 0.008333334", "Frame Time: 0"), "the frame time is 0"),

@@ -19,6 +19,8 @@ from manipnet.geometry import Array
 
 TYPES: Final = ("rigid body", "bone")
 PARTS: Final = ("Rotation", "Position")
+LARGEST: Final = 1e12
+"""A larger number is none that Motive writes."""
 _FIRST_LINE: Final = re.compile(r'\s*"?Format Version"?\s*([,;\t])')
 _OLD_WORDS: Final = ("comment", "righthanded", "lefthanded", "rigidbody", "trackable", "frame")
 _log = logging.getLogger(__name__)
@@ -182,9 +184,12 @@ def _number(cells: list[str], column: int, line: int, decimal_commas: bool) -> f
     if not text:
         return np.nan
     try:
-        return float(text.replace(",", ".") if decimal_commas else text)
+        value = float(text.replace(",", ".") if decimal_commas else text)
     except ValueError:
-        raise MotiveCsvError(f"line {line}, cell {column + 1}: {text!r} is not a number") from None
+        value = np.inf
+    if abs(value) >= LARGEST:
+        raise MotiveCsvError(f"line {line}, cell {column + 1}: {text!r} is not a number")
+    return value
 
 
 def _time(cells: list[str], decimal_commas: bool) -> float:

@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -11,6 +12,7 @@ import torch
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.layout import layout_of
 from manipnet_tools.takes.dataset import DataError, take_folders
+from manipnet_tools.takes.sources import licence_of
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, Samples, load_captured_hands
 from manipnet_tools.training.model import ManipNet, normalisation
@@ -116,4 +118,5 @@ def run(options: TrainOptions) -> None:
     names = [folder.name for folder in take_folders(options.data) if folder.name not in options.leave_out]
     if not names:
         raise DataError(f"--leave-out names every take of {options.data}; leave some to train on")
-    save_bundle(train(load_captured_hands(options.data, names), options.training, options.share), options.out)
+    trained = train(load_captured_hands(options.data, names), options.training, options.share)
+    save_bundle(replace(trained, licence=licence_of(options.data, names)), options.out)

@@ -13,11 +13,10 @@ from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.model.bundle import FORMAT
 from manipnet.synthesis.model.layout import layout_of
+from manipnet_tools.takes.sources import MANIPNET_LICENCE
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.model import ManipNet, export_onnx
 from manipnet_tools.training.quantise import halve_weights
-
-LICENCE = "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +36,8 @@ class Trained:
     """Share of each take that was used, from its start."""
     seconds: float
     """Time that training took."""
+    licence: str = MANIPNET_LICENCE
+    """The terms of the takes, which are those of the model."""
 
 
 def save_bundle(trained: Trained, folder: Path) -> None:
@@ -60,6 +61,6 @@ def save_bundle(trained: Trained, folder: Path) -> None:
             "minutes": round(trained.seconds / 60, 1),
             "date": date.today().isoformat(),
         },
-        "licence": LICENCE,
+        "licence": trained.licence,
     }
     (folder / "bundle.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")

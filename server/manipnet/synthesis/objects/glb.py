@@ -27,6 +27,7 @@ APPEARANCE: Final = (
     *("KHR_xmp", "KHR_animation", "KHR_audio", "ADOBE_materials_", "EXT_materials_", "VRMC_", "EXT_lights"),
 )
 """Extensions that begin so leave the surface as it is."""
+MAX_INSTANCES: Final = 10_000
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
@@ -35,7 +36,8 @@ def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     document, binary = _chunks(data)
     try:
         _check_extensions(document)
-        return _Scene(document, binary).triangles()
+        with np.errstate(all="ignore"):  # numbers that are not finite are refused when the mesh is checked
+            return _Scene(document, binary).triangles()
     except GlbError:
         raise
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
@@ -134,7 +136,8 @@ class _Scene:
     def _primitive(self, node: int, primitive: dict[str, Any], weights: list[float]) -> tuple[NDArray, NDArray] | None:
         """Vertices and triangles; None for points and lines."""
         mode = primitive.get("mode", _TRIANGLES)
-        if mode not in (_TRIANGLES, _STRIP, _FAN):
+        if mode not in (MAX_INSTANCES: Final = 10_000
+_TRIANGLES, _STRIP, _FAN):
             return None
         position = primitive["attributes"]["POSITION"]
         compressed = _extension(primitive, DRACO)
@@ -167,6 +170,8 @@ class _Scene:
             if name in ("TRANSLATION", "ROTATION", "SCALE")
         }
         count = min(map(len, parts.values()), default=1)
+        if count > MAX_INSTANCES:
+            raise GlbError(f"has {count} copies of one mesh; at most {MAX_INSTANCES} are allowed")
         return [world @ _matrix(**{name.lower(): values[i] for name, values in parts.items()}) for i in range(count)]
 
     def _world(self, node: int) -> NDArray:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 COMPONENTS: Final = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-MAX_ELEMENTS: Final = 10_000_000
+MAX_ELEMENTS: Final = 2_000_000
 
 
 class GlbError(ValueError):

@@ -40,15 +40,15 @@ def nesting_depths(vertices: Array, faces: NDArray[np.int32], part: NDArray[np.i
         )
         for inner in np.flatnonzero(inside_box):
             points = vertices[np.unique(faces[members[inner]])]
-            distances = sign * _distances(bvh, points[:: max(len(points) // _POINTS, 1)])
-            clear = distances[np.abs(distances) > touching]
+            points = np.ascontiguousarray(points[:: max(len(points) // _POINTS, 1)])
+            distances = np.empty(len(points))
+            _distances_into(bvh, points, distances)
+            clear = sign * distances[np.abs(distances) > touching]
             depths[inner] += bool(len(clear)) and bool((clear < 0.0).all())
     return depths
 
 
 @kernel
-def _distances(bvh: Bvh, points: Array):
-    distances = np.empty(len(points))
+def _distances_into(bvh: Bvh, points: Array, distances: Array):
     for i in range(len(points)):
         distances[i] = closest_point(bvh, points[i, 0], points[i, 1], points[i, 2], -1)[0]
-    return distances
