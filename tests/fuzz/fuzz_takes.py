@@ -68,11 +68,11 @@ def _glbs() -> list[bytes]:
     return [box_glb(box(0.1, 0.1, 0.1)).bytes(), sparse.bytes(), copies.bytes()]
 
 
+_PICKLES = [pickle.dumps({"fps": 20, "size": [0.1, 2.5, None]}, protocol) for protocol in range(6)]
+
 FILE_TARGETS = {
     "bvh": FileTarget(read_bvh, [_bvh(), b"\xef\xbb\xbf" + _bvh("1e-3 0 0")], BvhError, _place("take.bvh")),
     "motive": FileTarget(read_motive_csv, [_csv(), _csv(";"), _csv(labels=False)], MotiveCsvError, _place("take.csv")),
     "glb": FileTarget(read_glb, _glbs(), GlbError),
-    "pickle": FileTarget(
-        plain_values, [pickle.dumps({"fps": 20, "size": [0.1, 2.5, None]}, n) for n in range(6)], ValueError
-    ),
+    "pickle": FileTarget(plain_values, _PICKLES, ValueError),
 }

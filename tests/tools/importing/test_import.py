@@ -50,13 +50,13 @@ def write_taco(root: Path, sequence: str = "(stir, spoon, bowl)/20231105_019", l
     return root
 
 
-def check_fingers(take: Take, side: Side, size: float, tolerance_m: float) -> None:
+def check_fingers(take: Take, side: Side, size: float, tolerance_m: float, tip_tolerance_m: float = 0.012) -> None:
     """The joints are those of the other hand, as far as a hand of another size can be there."""
     expected = hand_joints(side, take.time_s, size)
     found = take.fingers[side].positions[:, model_joints(HAND)]
     distances = np.linalg.norm(found - expected, axis=2)[:, 2:]
     assert np.median(distances) < tolerance_m
-    assert np.linalg.norm(found[:, [8, 12, 16, 20]] - expected[:, [8, 12, 16, 20]], axis=2).mean() < 2 * tolerance_m
+    assert np.linalg.norm(found[:, [8, 12, 16, 20]] - expected[:, [8, 12, 16, 20]], axis=2).mean() < tip_tolerance_m
 
 
 def test_taco_becomes_takes_that_training_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -315,7 +315,7 @@ def test_glove_takes_in_bvh(tmp_path: Path, program: str, unit_m: float, mirrore
     take = read_take(take_folder)
     assert (take.name, take.objects) == ("gloves_take_one", ("Mug",))
     for side in SIDES:
-        check_fingers(take, side, SIZE, 0.006)
+        check_fingers(take, side, SIZE, 0.006, 0.016)  # the files have no fingertips
     np.testing.assert_allclose(take.bodies["Mug"].poses, object_poses("right", take.time_s), atol=2e-4)
     assert licence_of(data, [take.name]) == "our own; trained on gloves"
 
@@ -376,9 +376,14 @@ def test_glove_takes_in_a_table(tmp_path: Path, text: str) -> None:
     ("old", "new", "reason"),
     [
         ("Time", "Clock", "has no column time with the seconds of each frame"),
-        ("LeftHand_", "LeftIndexProximal_", "are the same joint of the left hand"),
+        ("LeftHand_", "LeftIndexProximal_", "two columns are called 'LeftIndexProximal_position_x'"),
+        ("LeftThumbTip_", "LeftWrist_", "'LeftHand' and 'LeftWrist' are the same joint of the left hand"),
         ("Left", "", "does not say whether it is left or right"),
-        ("Proximal", "Nothing", "no frame with its wrist and knuckles"),
+        (
+            "Proximal",
+            "Nothing",
+            "the left hand has no knuckle of the index; the joints that are recognised are LeftHand",
+        ),
     ],
 )
 def test_a_bad_table_is_refused_with_the_reason(tmp_path: Path, old: str, new: str, reason: str, capsys) -> None:

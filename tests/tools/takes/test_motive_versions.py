@@ -221,9 +221,39 @@ def test_the_reason_of_a_refusal_is_the_true_one(tmp_path: Path, old: str, new: 
         written(tmp_path, text)
 
 
-def test_the_list_of_frames_of_tracking_tools_is_named(tmp_path: Path) -> None:
-    with pytest.raises(TakeError, match=r"Tracking Tools and the first versions of Motive.*Motive 1\.7 or later"):
-        written(tmp_path, "comment,This is a comment\nrighthanded\ninfo,version,1.1\nframe,0,0.0,0,0\n")
+def frame_list(end: str = "") -> str:
+    """The list of frames that Tracking Tools and the first versions of Motive export."""
+    lines = [
+        "comment,OptiTrack",
+        "righthanded",
+        "info,version,1.1",
+        f"info,framecount,{FRAMES}",
+        "info,rigidbodycount,3",
+    ]
+    lines += [f"rigidbody,{name},{7 - i},1,0.0,0.0,0.0" for i, name in enumerate(NAMES)]
+    for k in range(FRAMES):
+        seen = [i for i in range(3) if (i, k) != (2, 5)]
+        cells = [f"{7 - i},{_numbers(pose(i, k)['Position'])},{_numbers(pose(i, k)['Rotation'])},0,0,0" for i in seen]
+        if k == 6:
+            cells[0] = "7,1.#QNAN,1.0,0.0,0,0,0,1,0,0,0"
+        lines += [f"frame,{k},{k / 120:.6f},{len(seen)},{','.join(cells)},0", f"rigidbody,{k},{k / 120:.6f},Box,5,0,0"]
+    return "\n".join(lines) + end
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return ",".join(f"{value:.6f}" for value in values)
+
+
+def test_the_list_of_frames_of_the_first_versions_reads_the_same(tmp_path: Path) -> None:
+    take = written(tmp_path, frame_list("\n"))
+    assert (take.rate_hz, list(take.bodies)) == (120.0, list(NAMES))
+    assert np.flatnonzero(~take.bodies["Box"].tracked).tolist() == [5]
+    assert np.flatnonzero(~take.bodies["left_wrist"].tracked).tolist() == [6]
+    np.testing.assert_allclose(take.bodies["right_wrist"].poses, poses(1), atol=2e-6)
+    with pytest.raises(TakeError, match="is left-handed; export it right-handed"):
+        written(tmp_path, frame_list().replace("righthanded", "lefthanded"))
+    with pytest.raises(TakeError, match="line 9: is not a frame"):
+        written(tmp_path, frame_list().replace("frame,0,0.000000,3,", "frame,0,0.000000,30,"))
 
 
 @pytest.mark.parametrize("factor", [1e6, 1e5])

@@ -6,19 +6,16 @@ hands are hands.
 """
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from manipnet.geometry import SIDES, Array, Side, quat_multiply, quat_rotate
 from manipnet.synthesis.hand.hand import Hand
-from manipnet_tools.importing.joint_names import recognised
+from manipnet_tools.importing.joint_names import recognised, require_palm
 from manipnet_tools.importing.source import JOINT_COUNT, ImportingError, SourceTake
 from manipnet_tools.importing.space import find_space
 from manipnet_tools.takes.bvh_folder import SPARE_FRAMES, bvh_files
 from manipnet_tools.takes.bvh_motion import BvhError, BvhMotion, read_bvh
-
-_KNUCKLES: Final = (5, 9, 13, 17)
 
 
 def bvh_take_folders(folder: Path) -> dict[str, Path]:
@@ -95,10 +92,7 @@ def hand_joints(motion: BvhMotion, where: str, default: Side | None) -> dict[Sid
     found = {side: {number for owner, number in owners if owner == side} for side in SIDES}
     hands = [side for side in SIDES if len(found[side]) > 3]
     for side in hands:
-        if missing := {0, *_KNUCKLES} - found[side]:
-            known = ", ".join(owners[side, number] for number in sorted(found[side]))
-            what = "wrist" if 0 in missing else f"knuckle of finger {min(missing) // 4 + 1}"
-            raise ImportingError(f"{where}: the {side} hand lacks its {what}; recognised are {known}")
+        require_palm(side, {number: owners[side, number] for number in found[side]}, where)
     return {side: joints[side] for side in hands}
 
 

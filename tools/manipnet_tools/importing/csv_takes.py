@@ -15,7 +15,7 @@ import numpy as np
 
 from manipnet.geometry import SIDES, Array, Side
 from manipnet.synthesis.hand.hand import Hand
-from manipnet_tools.importing.joint_names import recognised
+from manipnet_tools.importing.joint_names import recognised, require_palm
 from manipnet_tools.importing.source import JOINT_COUNT, ImportingError, SourceTake
 from manipnet_tools.importing.space import find_space
 from manipnet_tools.takes.text_file import read_text
@@ -52,7 +52,7 @@ def read_csv_take(path: Path, hand: Hand) -> SourceTake:
     columns = [cell.strip() for cell in lines[0]] if lines else []
     numbers = _numbers(lines[1:], len(columns), separator != ",", path)
     rate_hz, numbers = _at_one_rate(columns, numbers, path)
-    parts = _parts(columns)
+    parts = _parts(columns, path)
     hands = _hands(parts, numbers, path)
     objects = {
         name: numbers[:, [part[axis] for axis in _POSE]] for name, part in parts.items() if part.keys() >= set(_POSE)
@@ -66,8 +66,10 @@ def read_csv_take(path: Path, hand: Hand) -> SourceTake:
     )
 
 
-def _parts(columns: list[str]) -> dict[str, dict[str, int]]:
-    """The columns of every joint and object, by component."""
+def _parts(columns: list[str], path: Path) -> dict[str, dict[str, int]]:
+    """The columns of every joint and object, by component. Raises `ImportingError` for two of one name."""
+    if twice := [column for column in columns if column and columns.count(column) > 1]:
+        raise ImportingError(f"{path}: two columns are called {twice[0]!r}; rename one")
     parts: dict[str, dict[str, int]] = {}
     for number, column in enumerate(columns):
         if (found := _COLUMN.match(column)) is not None:
@@ -88,6 +90,8 @@ def _hands(parts: dict[str, dict[str, int]], numbers: Array, path: Path) -> dict
         owners[side, joint] = name
         hands[side][:, joint] = numbers[:, [parts[name][axis] for axis in "xyz"]]
     found = {side: joints for side, joints in hands.items() if any(owner == side for owner, _ in owners)}
+    for side in found:
+        require_palm(side, {joint: name for (owner, joint), name in owners.items() if owner == side}, str(path))
     if not found:
         raise ImportingError(f"{path}: no column is that of a hand's joint, such as LeftIndexProximal_x")
     return found

@@ -76,7 +76,7 @@ def _read(file: Path, hand: Hand) -> SourceTake:
 def _session(file: Path) -> tuple[dict[str, Array], dict[str, Any]]:
     """The arrays and the metadata of a session. Raises `ImportingError`."""
     try:
-        with np.load(file, allow_pickle=False) as data:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
             if missing := [name for name in _NEEDED if name not in data]:
                 raise ImportingError(f"{file}: is not a session of DexterHand; it holds no {missing[0]}")
             arrays = {name: data[name] for name in _NEEDED[1:]}

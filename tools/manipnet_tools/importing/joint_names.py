@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from manipnet.geometry import Side
-from manipnet_tools.importing.source import FINGERS
+from manipnet_tools.importing.source import FINGERS, PALM, ImportingError
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _SIDES: Final[dict[str, Side]] = {"left": "left", "l": "left", "right": "right", "r": "right"}
@@ -37,6 +37,14 @@ def recognised(names: Iterable[str]) -> dict[str, Joint]:
         elif (place := _place(finger, part, with_base=(side, "base") in thumbs)) is not None:
             joints[name] = (side, 1 + 4 * finger + place)
     return joints
+
+
+def require_palm(side: Side, names: dict[int, str], where: str) -> None:
+    """Raise `ImportingError` if the wrist or a knuckle is missing from the joints of a hand, `names` by number."""
+    if missing := [number for number in PALM if number not in names]:
+        what = f"knuckle of the {FINGERS[missing[0] // 4]}" if missing[0] else "wrist"
+        known = ", ".join(names[number] for number in sorted(names)) or "none"
+        raise ImportingError(f"{where}: the {side} hand has no {what}; the joints that are recognised are {known}")
 
 
 def _parse(name: str) -> tuple[Side | None, int | None, str] | None:

@@ -14,7 +14,7 @@ import numpy as np
 from manipnet.geometry import Array, Side, matrix_to_quat, mirror_points, mirror_poses
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet_tools.importing.source import FINGERS, JOINT_COUNT, ImportingError
+from manipnet_tools.importing.source import FINGERS, JOINT_COUNT, PALM, ImportingError
 
 STEPS: Final = 40
 SETTLED_RAD: Final = 1e-4
@@ -27,7 +27,6 @@ LENGTH_CHANGE: Final = 0.2
 """Bones that change their lengths by more than this are not those of a hand."""
 START_RAD: Final = 0.2
 _FRAMES_AT_ONCE: Final = 2000
-_PALM: Final = (0, 5, 9, 13, 17)
 _PALM_WEIGHTS: Final = np.array([0.5, 1.0, 1.0, 1.0, 1.0])
 _WEIGHTS: Final = np.array([0.0, 0.3, 0.7, 1.0, 1.5, *4 * (0.7, 1.0, 1.0, 1.5)])
 _MEASURED: Final = np.arange(2, JOINT_COUNT)
@@ -62,7 +61,7 @@ def fit_hand(joints: Array, side: Side, hand: Hand) -> Fit:
     Raises `ImportingError` for joints that are not those of a hand.
     """
     points = joints if side == "right" else mirror_points(joints)
-    seen = np.isfinite(points[:, _PALM]).all(axis=(1, 2))
+    seen = np.isfinite(points[:, PALM]).all(axis=(1, 2))
     if not seen.any():
         raise ImportingError(f"the {side} hand has no frame with its wrist and knuckles")
     _check_lengths(points[seen], side)
@@ -103,9 +102,9 @@ def _check_lengths(points: Array, side: Side) -> None:
 
 def _palm_pose(points: Array, hand: Hand) -> tuple[Array, Array]:
     """Rotations `(T, 3, 3)` and translations `(T, 3)` of the wrist that put the model's palm onto the points."""
-    model = forward_kinematics(hand, np.zeros(hand.angle_count))[0][model_joints(hand)][list(_PALM)]
+    model = forward_kinematics(hand, np.zeros(hand.angle_count))[0][model_joints(hand)][list(PALM)]
     shares = _PALM_WEIGHTS / _PALM_WEIGHTS.sum()
-    palm = points[:, _PALM]
+    palm = points[:, PALM]
     centre, model_centre = np.einsum("k,tki->ti", shares, palm), shares @ model
     covariance = np.einsum("k,tki,kj->tij", shares, palm - centre[:, None], model - model_centre)
     u, _, vt = np.linalg.svd(covariance)

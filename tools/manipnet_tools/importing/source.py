@@ -14,6 +14,9 @@ JOINT_COUNT: Final = 21
 The thumb's are those of its metacarpal (CMC), proximal (MCP) and distal (IP) bones, the others' MCP, PIP and DIP.
 """
 
+PALM: Final = (0, 5, 9, 13, 17)
+"""The joints of the palm: the wrist and the knuckles of the four fingers."""
+
 
 class ImportingError(ValueError):
     """Something cannot be imported; the text names the file, the reason and the remedy."""

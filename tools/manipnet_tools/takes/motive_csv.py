@@ -1,8 +1,9 @@
 """Reads the rigid bodies and bones of a take that OptiTrack Motive exported as CSV.
 
-The first line holds pairs of a key and a value, and a table follows (`motive_table`). An empty cell means that a body
-was lost in that frame. The time column is rounded to a millisecond, so times are computed from the frame numbers.
-Source: docs.optitrack.com, "Data Export: CSV", and files of the format versions 1.2 to 1.25.
+The first line holds pairs of a key and a value, and a table follows (`motive_table`); before format 1.2 it was a list
+of frames (`motive_frames`). An empty cell means that a body was lost in that frame. The time column is rounded to a
+millisecond, so times are computed from the frame numbers.
+Source: docs.optitrack.com, "Data Export: CSV", and files of the format versions 1.1 to 1.25.
 """
 
 import logging
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import Array
+from manipnet_tools.takes.motive_frames import read_frames
 from manipnet_tools.takes.motive_table import Columns, MotiveCsvError, Table, read_table
 from manipnet_tools.takes.text_file import read_text
 
@@ -22,6 +24,9 @@ UNITS_M: Final = {"meters": 1.0, "centimeters": 0.01, "millimeters": 0.001}
 EULER_ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 QUATERNION: Final = "XYZW"
 UNTRACKED: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+FIRST_WORDS: Final = ("comment", "info")
+HANDEDNESS: Final = ("righthanded", "lefthanded")
+"""How the list of frames of older versions begins."""
 FARTHEST_M: Final = 1000.0
 QUATERNION_LENGTHS: Final = (0.25, 4.0)
 """Poses beyond these are numbers that lost their decimal points."""
@@ -43,7 +48,9 @@ class MotiveCsv:
 def read_motive_csv(path: Path) -> MotiveCsv:
     """Read an export with rigid bodies or bones. Raises `MotiveCsvError`."""
     try:
-        return _motive_csv(read_table(read_text(path), str(path)), str(path))
+        text = read_text(path)
+        is_list = text.lstrip().lower().startswith(tuple(f"{word}," for word in FIRST_WORDS) + HANDEDNESS)
+        return _motive_csv(read_frames(text) if is_list else read_table(text, str(path)), str(path))
     except OSError as error:
         raise MotiveCsvError(f"{path}: cannot be read ({error})") from None
     except MotiveCsvError as error:

@@ -22,7 +22,6 @@ PARTS: Final = ("Rotation", "Position")
 LARGEST: Final = 1e12
 """A larger number is none that Motive writes."""
 _FIRST_LINE: Final = re.compile(r'\s*"?Format Version"?\s*([,;\t])')
-_OLD_WORDS: Final = ("comment", "righthanded", "lefthanded", "rigidbody", "trackable", "frame")
 _log = logging.getLogger(__name__)
 
 
@@ -90,11 +89,6 @@ def _separators(text: str) -> tuple[str, bool]:
     """What separates the cells, and whether the numbers have decimal commas."""
     found = _FIRST_LINE.match(text)
     if found is None:
-        if text.lstrip().lower().startswith(tuple(f"{word}," for word in _OLD_WORDS)):
-            raise MotiveCsvError(
-                "is the list of frames that Tracking Tools and the first versions of Motive export; "
-                "open the take in Motive 1.7 or later and export it again"
-            )
         raise MotiveCsvError(
             "is not a CSV export of Motive, whose first line starts with Format Version; "
             "turn on Header Information when exporting"

@@ -136,8 +136,7 @@ class _Scene:
     def _primitive(self, node: int, primitive: dict[str, Any], weights: list[float]) -> tuple[NDArray, NDArray] | None:
         """Vertices and triangles; None for points and lines."""
         mode = primitive.get("mode", _TRIANGLES)
-        if mode not in (MAX_INSTANCES: Final = 10_000
-_TRIANGLES, _STRIP, _FAN):
+        if mode not in (_TRIANGLES, _STRIP, _FAN):
             return None
         position = primitive["attributes"]["POSITION"]
         compressed = _extension(primitive, DRACO)
