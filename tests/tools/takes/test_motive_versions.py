@@ -252,7 +252,7 @@ def test_the_list_of_frames_of_the_first_versions_reads_the_same(tmp_path: Path)
     np.testing.assert_allclose(take.bodies["right_wrist"].poses, poses(1), atol=2e-6)
     with pytest.raises(TakeError, match="is left-handed; export it right-handed"):
         written(tmp_path, frame_list().replace("righthanded", "lefthanded"))
-    with pytest.raises(TakeError, match="line 9: is not a frame"):
+    with pytest.raises(TakeError, match="line 8: is not a frame"):
         written(tmp_path, frame_list().replace("frame,0,0.000000,3,", "frame,0,0.000000,30,"))
 
 

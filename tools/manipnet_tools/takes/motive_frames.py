@@ -1,6 +1,6 @@
 """Reads the list of frames that Tracking Tools and the first versions of Motive export as CSV (format 1.1 and before).
 
-Every line begins with its kind. `rigidbody,<name>,<id>,…` defines a body, and each `frame,<number>,<seconds>,<bodies>,…`
+Every line begins with its kind. `rigidbody,<name>,<id>,…` defines a body, and `frame,<number>,<seconds>,<bodies>,…`
 holds for each body that was tracked its ID, x y z, the quaternion x y z w and three angles, in metres. A number with #
 was not measured. Such a file has no rate, so the rate is that of the times.
 """

@@ -16,7 +16,7 @@ _REMEDIES: Final = {
     "a file of Maya, 3ds Max, Cinema 4D or SketchUp": "export it from that program as OBJ or glTF Binary (.glb)",
 }
 """What to do with a file, by what it is."""
-_SUFFIXES: Final = {
+SUFFIXES: Final = {
     ".fbx": "FBX",
     ".blend": "a Blender file",
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), "USD"),
@@ -27,6 +27,7 @@ _SUFFIXES: Final = {
     ".abc": "Alembic",
     **dict.fromkeys((".ma", ".mb", ".max", ".3ds", ".c4d", ".skp"), "a file of Maya, 3ds Max, Cinema 4D or SketchUp"),
 }
+"""What files are, by the ends of their names."""
 _BEGINNINGS: Final = {
     b"Kaydara FBX": "FBX",
     b"; FBX": "FBX",
@@ -39,7 +40,7 @@ _BEGINNINGS: Final = {
 
 def foreign_format(path: Path) -> str | None:
     """Why a file cannot be read as a mesh, and what to do, if it is of a format that is known but not read."""
-    kind = _SUFFIXES.get(path.suffix.lower())
+    kind = SUFFIXES.get(path.suffix.lower())
     if kind is None and path.is_file():
         with path.open("rb") as file:
             beginning = file.read(64)
