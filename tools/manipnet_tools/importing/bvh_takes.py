@@ -73,7 +73,7 @@ def hand_joints(motion: BvhMotion, where: str, default: Side | None) -> dict[Sid
     Raises `ImportingError` for joints of one name and for hands that lack a knuckle.
     """
     names = [joint.name for joint in motion.joints]
-    joints = {side: np.full((len(motion.motion), JOINT_COUNT, 3), np.nan) for side in SIDES}
+    joints: dict[Side, Array] = {side: np.full((len(motion.motion), JOINT_COUNT, 3), np.nan) for side in SIDES}
     owners: dict[tuple[Side, int], str] = {}
     positions, ends = _world(motion)
     for name, (named, number) in recognised(names).items():
@@ -90,7 +90,7 @@ def hand_joints(motion: BvhMotion, where: str, default: Side | None) -> dict[Sid
         if number and (number - 1) % 4 == 2 and motion.joints[j].end is not None and (side, number + 1) not in owners:
             joints[side][:, number + 1] = ends[:, j]
     found = {side: {number for owner, number in owners if owner == side} for side in SIDES}
-    hands = [side for side in SIDES if len(found[side]) > 3]
+    hands: list[Side] = [side for side in SIDES if len(found[side]) > 3]
     for side in hands:
         require_palm(side, {number: owners[side, number] for number in found[side]}, where)
     return {side: joints[side] for side in hands}

@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+from manipnet.geometry import Side
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import ClosedMesh, MeshError, load_mesh
@@ -19,7 +20,7 @@ from manipnet_tools.importing.csv_takes import csv_take_files, read_csv_take
 from manipnet_tools.importing.dataset_writer import SHORTEST_S, pieces, write_mesh, write_piece
 from manipnet_tools.importing.dexterhand import open_dexterhand
 from manipnet_tools.importing.options import ImportOptions
-from manipnet_tools.importing.retarget import fit_hand
+from manipnet_tools.importing.retarget import Fit, fit_hand
 from manipnet_tools.importing.source import ImportingError, Origin, SourceSet
 from manipnet_tools.importing.taco import open_taco
 from manipnet_tools.takes.meshes import named_files
@@ -87,7 +88,7 @@ def import_take(source: SourceSet, name: str, hand: Hand, data: Path) -> dict[st
     if not take.objects:
         raise ImportingError("has no object; a take for training needs the poses of what the hands hold")
     meshes = {stem: source.mesh(stem) for stem in take.objects}
-    fits = {side: fit_hand(joints, side, hand) for side, joints in take.hands.items()}
+    fits: dict[Side, Fit] = {side: fit_hand(joints, side, hand) for side, joints in take.hands.items()}
     parts = list(pieces(take, fits, _take_name(source.origin.name, name)))
     if not parts:
         raise ImportingError(f"has no {SHORTEST_S} s in which its hands and objects are all there")

@@ -89,7 +89,9 @@ def _hands(parts: dict[str, dict[str, int]], numbers: Array, path: Path) -> dict
             raise ImportingError(f"{path}: {owners[side, joint]!r} and {name!r} are the same joint of the {side} hand")
         owners[side, joint] = name
         hands[side][:, joint] = numbers[:, [parts[name][axis] for axis in "xyz"]]
-    found = {side: joints for side, joints in hands.items() if any(owner == side for owner, _ in owners)}
+    found: dict[Side, Array] = {
+        side: joints for side, joints in hands.items() if any(owner == side for owner, _ in owners)
+    }
     for side in found:
         require_palm(side, {joint: name for (owner, joint), name in owners.items() if owner == side}, str(path))
     if not found:

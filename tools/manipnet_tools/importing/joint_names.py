@@ -52,7 +52,7 @@ def _parse(name: str) -> tuple[Side | None, int | None, str] | None:
     words = [word.lower() for word in _WORD.findall(name.rpartition(":")[2])]
     if _BODY & set(words):
         return None
-    side = next((_SIDES[word] for word in words if word in _SIDES), None)
+    side: Side | None = next((_SIDES[word] for word in words if word in _SIDES), None)
     finger = next((_FINGERS[word] for word in words if word in _FINGERS), None)
     if finger is None and "digit" in words and (number := _number(words, "digit")) is not None:
         finger = number - 1

@@ -39,7 +39,7 @@ class Space:
 def find_space(hands: dict[Side, Array], hand: Hand) -> Space:
     """The space of joints `(T, 21, 3)` in a file's own lengths. Raises `ImportingError`."""
     unit = _unit(hands, hand)
-    sample = {side: _sample(UNITS_M[unit] * joints) for side, joints in hands.items()}
+    sample: dict[Side, Array] = {side: _sample(UNITS_M[unit] * joints) for side, joints in hands.items()}
     better = {
         side: _error(mirror_points(joints), side, hand) < CLEARLY_BETTER * _error(joints, side, hand)
         for side, joints in sample.items()

@@ -71,7 +71,7 @@ def _read(name: str, file: Path, objects: Path) -> SourceTake:
 def _poses(matrices: Array) -> Array:
     """Poses `(T, 7)` with Y up from matrices `(T, 4, 4)` with Z up; NaN where a matrix is no pose."""
     rotations, places = _Y_UP @ matrices[:, :3, :3].astype(np.float64), matrices[:, :3, 3] @ _Y_UP.T
-    right = np.isfinite(matrices).all(axis=(1, 2))
+    right = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     right[right] = np.abs(np.linalg.det(rotations[right]) - 1.0) < 0.05
     poses = np.full((len(matrices), 7), np.nan)
     poses[right] = np.concatenate([places[right], matrix_to_quat(rotations[right])], axis=1)

@@ -18,6 +18,8 @@ from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.units import UNITS_M
 from manipnet_tools.takes.bvh_motion import BvhError, BvhMotion, Joint, read_bvh
 
+_Ordered = tuple[list[Joint], Array, Array]
+"""The joints of a hand in the order of its bones, with translations `(T, 17, 3)` and rotations `(T, 17, 4)`."""
 SPARE_FRAMES: Final = 2
 """Files of one take may differ by this many frames at their ends, which are left out."""
 SIZE_RATIOS: Final = (0.5, 1.6)
@@ -42,9 +44,11 @@ def read_bvh_folder(folder: Path) -> BvhFolder:
     rate_hz = _rate(files, folder)
     frames = _shortest(files, folder)
     hand = shipped_hand()  # the dataset's subject, whose fingertips its files lack
-    ordered = {side: _in_order(files[f"{side}Hand"], hand, folder / f"{side}Hand.bvh") for side in SIDES}
+    ordered: dict[Side, _Ordered] = {
+        side: _in_order(files[f"{side}Hand"], hand, folder / f"{side}Hand.bvh") for side in SIDES
+    }
     space = _space(ordered, hand, folder)
-    hands = {side: _hand(ordered[side], frames, side, hand, space) for side in SIDES}
+    hands: dict[Side, tuple[Array, Array]] = {side: _hand(ordered[side], frames, side, hand, space) for side in SIDES}
     objects = {stem: _root_poses(bvh, frames, space) for stem, bvh in files.items() if stem not in HANDS}
     return BvhFolder(rate_hz, hands, objects)
 
@@ -90,8 +94,8 @@ def _shortest(files: dict[str, BvhMotion], folder: Path) -> int:
     return shortest
 
 
-def _in_order(bvh: BvhMotion, hand: Hand, path: Path) -> tuple[list[Joint], Array, Array]:
-    """Joints, translations `(T, 17, 3)` and rotations `(T, 17, 4)` in the order of the hand's bones.
+def _in_order(bvh: BvhMotion, hand: Hand, path: Path) -> _Ordered:
+    """The joints in the order of the hand's bones.
 
     Names may have a prefix, as in `Bip01 INDEX_MCP` and `Ann:INDEX_MCP`.
     """
@@ -130,7 +134,7 @@ class _Space:
         return mirror_quats(quats) if self.mirrored else quats
 
 
-def _space(hands: dict[Side, tuple[list[Joint], Array, Array]], hand: Hand, folder: Path) -> _Space:
+def _space(hands: dict[Side, _Ordered], hand: Hand, folder: Path) -> _Space:
     """The unit and handedness in which the offsets of both hands are those of a hand. Raises `BvhError`."""
     measured = {side: np.array([joint.offset for joint in joints[1:]]) for side, (joints, _, _) in hands.items()}
     model = hand.offsets[1 : hand.bone_count]
@@ -161,9 +165,7 @@ def _root_poses(bvh: BvhMotion, frames: int, space: _Space) -> Array:
     return mirror_poses(poses) if space.mirrored else poses
 
 
-def _hand(
-    ordered: tuple[list[Joint], Array, Array], frames: int, side: Side, hand: Hand, space: _Space
-) -> tuple[Array, Array]:
+def _hand(ordered: _Ordered, frames: int, side: Side, hand: Hand, space: _Space) -> tuple[Array, Array]:
     """World joints and bone rotations; the fingertips, which the files lack, are those of `hand`."""
     bones = hand.bone_count
     translations, local = space.points(ordered[1][:frames]), space.quats(ordered[2][:frames])

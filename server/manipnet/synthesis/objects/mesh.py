@@ -10,7 +10,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from manipnet.synthesis.objects.foreign import foreign_format
-from manipnet.synthesis.objects.glb import GlbError, read_glb
+from manipnet.synthesis.objects.glb import read_glb
+from manipnet.synthesis.objects.glb_accessors import GlbError
 from manipnet.synthesis.objects.repair import (
     agree,
     drop_debris,
