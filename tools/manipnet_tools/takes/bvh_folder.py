@@ -16,10 +16,10 @@ from manipnet.geometry import SIDES, Array, Side, mirror_points, mirror_poses, m
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.units import UNITS_M
-from manipnet_tools.takes.bvh_motion import BvhError, BvhMotion, Joint, read_bvh
+from manipnet_tools.takes.bvh_motion import BvhError, BvhMotion, read_bvh
 
-_Ordered = tuple[list[Joint], Array, Array]
-"""The joints of a hand in the order of its bones, with translations `(T, 17, 3)` and rotations `(T, 17, 4)`."""
+_Ordered = tuple[Array, Array]
+"""Translations `(T, 17, 3)` and rotations `(T, 17, 4)` of a hand's bones in their order, each in its parent bone."""
 SPARE_FRAMES: Final = 2
 """Files of one take may differ by this many frames at their ends, which are left out."""
 SIZE_RATIOS: Final = (0.5, 1.6)
@@ -95,10 +95,7 @@ def _shortest(files: dict[str, BvhMotion], folder: Path) -> int:
 
 
 def _in_order(bvh: BvhMotion, hand: Hand, path: Path) -> _Ordered:
-    """The joints in the order of the hand's bones.
-
-    Names may have a prefix, as in `Bip01 INDEX_MCP` and `Ann:INDEX_MCP`.
-    """
+    """The motion of the hand's bones. Joints may have a prefix, as in `Bip01 INDEX_MCP` and `Ann:INDEX_MCP`."""
     expected = hand.joint_names[: hand.bone_count]
     found = {_bare(joint.name): j for j, joint in enumerate(bvh.joints)}
     if len(bvh.joints) != len(expected) or set(found) != set(expected):
@@ -113,7 +110,7 @@ def _in_order(bvh: BvhMotion, hand: Hand, path: Path) -> _Ordered:
             above = bvh.joints[actual].name if actual >= 0 else "none"
             raise BvhError(f"{path}: the parent of {name} must be {expected[parent]}, found {above}")
     translations, rotations = bvh.local_transforms()
-    return [bvh.joints[j] for j in order], translations[:, order], rotations[:, order]
+    return translations[:, order], rotations[:, order]
 
 
 def _bare(name: str) -> str:
@@ -135,8 +132,8 @@ class _Space:
 
 
 def _space(hands: dict[Side, _Ordered], hand: Hand, folder: Path) -> _Space:
-    """The unit and handedness in which the offsets of both hands are those of a hand. Raises `BvhError`."""
-    measured = {side: np.array([joint.offset for joint in joints[1:]]) for side, (joints, _, _) in hands.items()}
+    """The unit and handedness in which the bones of both hands are those of a hand. Raises `BvhError`."""
+    measured = {side: np.median(translations[:, 1:], axis=0) for side, (translations, _) in hands.items()}
     model = hand.offsets[1 : hand.bone_count]
     size = float(np.mean([np.linalg.norm(offsets, axis=1).sum() for offsets in measured.values()]))
     ratios = {unit: size * metres / float(np.linalg.norm(model, axis=1).sum()) for unit, metres in UNITS_M.items()}
@@ -168,7 +165,7 @@ def _root_poses(bvh: BvhMotion, frames: int, space: _Space) -> Array:
 def _hand(ordered: _Ordered, frames: int, side: Side, hand: Hand, space: _Space) -> tuple[Array, Array]:
     """World joints and bone rotations; the fingertips, which the files lack, are those of `hand`."""
     bones = hand.bone_count
-    translations, local = space.points(ordered[1][:frames]), space.quats(ordered[2][:frames])
+    translations, local = space.points(ordered[0][:frames]), space.quats(ordered[1][:frames])
     tips = hand.offsets[bones:] if side == "right" else mirror_points(hand.offsets[bones:])
     positions = np.empty((frames, hand.joint_count, 3))
     world = np.empty((frames, bones, 4))
