@@ -2,12 +2,14 @@
 
 import json
 import pickle
+import re
 import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from other_joints import HAND, angles_at, hand_joints, object_poses, times_s, wrist_at, write_box
+from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import SIDES, Side, mirror_points, mirror_poses, quat_to_matrix
 from manipnet.synthesis.hand.kinematics import forward_kinematics
@@ -32,11 +34,10 @@ def matrices(poses: np.ndarray) -> np.ndarray:
     return result
 
 
-def write_taco(root: Path, sequence: str = "(stir, spoon, bowl)/20231105_019", lost: slice = slice(0, 0)) -> Path:
+def write_taco(root: Path, sequence: str = "(stir, spoon, bowl)/20231105_019", seconds: float = SECONDS) -> Path:
     """A sequence in which the right hand holds the tool and the left hand the target."""
-    t_s = times_s(SECONDS, 30.0)
+    t_s = times_s(seconds, 30.0)
     joints = np.stack([hand_joints(side, t_s, SIZE) for side in ("left", "right")], axis=1) @ Z_UP.T
-    joints[lost] = np.nan
     (root / "Hand_Poses_3D" / sequence).mkdir(parents=True)
     np.save(root / "Hand_Poses_3D" / sequence / "hand_joints.npy", joints.astype(np.float32))
     objects = root / "Object_Poses" / sequence
@@ -84,6 +85,18 @@ def test_taco_becomes_takes_that_training_reads(tmp_path: Path, capsys: pytest.C
     assert "CC BY-NC 4.0" in licence_of(data, [folder.name, "mug1"])
 
 
+@pytest.mark.slow
+def test_a_model_that_is_trained_on_them_states_their_licence(tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="training needs the train extra")
+    from manipnet.synthesis.model.bundle import load_bundle
+
+    data, model = tmp_path / "data", tmp_path / "model"
+    assert cli.main(["import", "taco", str(write_taco(tmp_path / "taco", seconds=6.0)), "--out", str(data)]) == 0
+    size = ["--training.width=24", "--training.rounds=1", "--training.epochs-per-round=1", "--training.batch=32"]
+    assert cli.main(["train", "--data", str(data), "--out", str(model), *size]) == 0
+    assert load_bundle(str(model)).meta["licence"].startswith("CC BY 4.0; trained on TACO by Yun Liu")
+
+
 def test_a_gap_divides_a_take_and_a_short_one_does_not(tmp_path: Path) -> None:
     taco = write_taco(tmp_path / "taco", "(cut, knife, bowl)/a")
     joints = np.load(file := taco / "Hand_Poses_3D/(cut, knife, bowl)/a/hand_joints.npy")
@@ -127,8 +140,6 @@ def test_nonsense_is_refused_with_the_reason(tmp_path: Path, spoil, reason: str,
     spoil(taco)
     assert cli.main(["import", "taco", str(taco), "--out", str(tmp_path / "data")]) == 1
     printed = " ".join(capsys.readouterr().err.split())
-    import re
-
     assert re.search(reason, printed), printed
     assert "could be imported, for the reasons above" in printed
 
@@ -177,8 +188,6 @@ def hand_bvh(
 def object_bvh(
     side: Side, rate_hz: float, unit_m: float = 1.0, mirrored: bool = False, seconds: float = SECONDS
 ) -> str:
-    from scipy.spatial.transform import Rotation
-
     poses = object_poses(side, times_s(seconds, rate_hz))
     poses = mirror_poses(poses) if mirrored else poses
     turns = Rotation.from_quat(poses[:, 3:]).as_euler("ZXY", degrees=True)
@@ -339,10 +348,10 @@ def test_a_take_without_its_mesh_or_object_is_refused(tmp_path: Path, capsys: py
     assert "the object 'Mug' has no mesh; give --mesh Mug=FILE" in " ".join(capsys.readouterr().err.split())
 
 
-def table(separator: str = ",", decimal: str = ".", rate_hz: float = 90.0, drop: slice = slice(0, 0)) -> str:
-    t_s = times_s(SECONDS, rate_hz)
+def table_columns(t_s: np.ndarray, sides: tuple[Side, ...] = SIDES) -> dict[str, np.ndarray]:
+    """A table in centimetres, with joints named as Rokoko names them, by column."""
     columns: dict[str, np.ndarray] = {"Frame": np.arange(len(t_s)), "Time": t_s + 12.0}
-    for side in SIDES:
+    for side in sides:
         joints = 100 * hand_joints(side, t_s, SIZE)
         names = [f"{side.title()}Hand"]
         names += [f"{side.title()}{f.title()}{p}" for f in FINGER_ORDER for p in (*_words(f), "Tip")]
@@ -350,10 +359,19 @@ def table(separator: str = ",", decimal: str = ".", rate_hz: float = 90.0, drop:
             columns |= {f"{name}_position_{axis}": joints[:, number, i] for i, axis in enumerate("xyz")}
     poses = object_poses("right", t_s)
     columns |= {f"Mug_position_{axis}": 100 * poses[:, i] for i, axis in enumerate("xyz")}
-    columns |= {f"Mug_rotation_{axis}": poses[:, 3 + i] for i, axis in enumerate("xyzw")}
+    return columns | {f"Mug_rotation_{axis}": poses[:, 3 + i] for i, axis in enumerate("xyzw")}
+
+
+def table_text(
+    columns: dict[str, np.ndarray], separator: str = ",", decimal: str = ".", drop: slice = slice(0, 0)
+) -> str:
     rows = np.delete(np.stack(list(columns.values()), axis=1), np.r_[drop], axis=0)
     lines = [separator.join(columns), *(separator.join(f"{v:.6f}".replace(".", decimal) for v in row) for row in rows)]
     return "\n".join(lines) + "\n"
+
+
+def table(separator: str = ",", decimal: str = ".", drop: slice = slice(0, 0)) -> str:
+    return table_text(table_columns(times_s(SECONDS, 90.0)), separator, decimal, drop)
 
 
 @pytest.mark.parametrize(
@@ -392,11 +410,13 @@ def test_a_bad_table_is_refused_with_the_reason(tmp_path: Path, old: str, new: s
     assert reason in " ".join(capsys.readouterr().err.split())
 
 
-def test_left_and_right_exchanged_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = table().replace("Left", "#").replace("Right", "Left").replace("#", "Right")
-    one_sided = "\n".join(text.splitlines())
-    (tmp_path / "grab.csv").write_text(one_sided)
+def test_a_hand_under_the_other_name_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    t_s = times_s(SECONDS, 60.0)
+    left = {name.replace("Left", "Right"): values for name, values in table_columns(t_s, ("left",)).items()}
+    (tmp_path / "grab.csv").write_text(table_text(left | table_columns(t_s, ("left",))))
     assert cli.main(["import", "csv", str(tmp_path / "grab.csv"), "--out", str(tmp_path / "data")]) == 1
+    expected = "the joints called right are those of the other hand; exchange left and right"
+    assert expected in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize(
