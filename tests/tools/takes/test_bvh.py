@@ -182,6 +182,11 @@ def test_capital_letters_in_a_file_name_make_no_difference(tmp_path: Path, plain
         read_take(tmp_path / "plain")
 
 
+def test_an_object_that_is_called_like_a_wrist_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TakeError, match="left_wrist is the name of a wrist; call the object"):
+        read_take(write_take(tmp_path / "plain", box_file="left_wrist.bvh"))
+
+
 def test_files_with_rounded_frame_times_share_one_rate(tmp_path: Path, plain: Take) -> None:
     rounded = write_take(tmp_path / "plain", change_box=lambda text: text.replace("0.008333334", "0.008333"))
     check(read_take(rounded), plain)
@@ -282,5 +287,5 @@ def test_a_take_for_other_programs_is_read_back(tmp_path: Path, plain: Take) -> 
 
 def test_a_single_file_is_refused_with_the_way_round(tmp_path: Path) -> None:
     path = write_take(tmp_path / "plain") / "Box.bvh"
-    with pytest.raises(TakeError, match="a single BVH file is not a take, which is the folder that holds it"):
+    with pytest.raises(TakeError, match="a single BVH file is not a take; give its folder"):
         read_take(path)

@@ -140,6 +140,10 @@ def test_every_line_end_reads_the_same(tmp_path: Path, end: str) -> None:
     check(written(tmp_path, Export().text().replace("\n", end), name="TAKE.CSV"))
 
 
+def test_notes_with_commas_do_not_shift_the_settings(tmp_path: Path) -> None:
+    check(written(tmp_path, Export().text().replace("Take Notes,,", "Take Notes,first try, left hand slips,again,")))
+
+
 def test_bones_are_wrists_and_props(tmp_path: Path) -> None:
     names = ("Ann:LHand", "Ann:RHand", "Ann:Head")
     take = read(tmp_path, Export(names=names, kinds=("Bone",) * 3, parents=True))

@@ -67,6 +67,10 @@ def _files(folder: Path) -> dict[str, BvhMotion]:
         if stem in files:
             raise BvhError(f"{folder}: two files are called {stem}.bvh but for capital letters; keep one of them")
         files[stem] = read_bvh(path)
+    if wrists := {"left_wrist", "right_wrist"} & files.keys():
+        raise BvhError(
+            f"{folder}: {min(wrists)} is the name of a wrist; call the object {min(wrists)}.bvh something else"
+        )
     if missing := set(HANDS) - files.keys():
         raise BvhError(f"{folder}: no {' and no '.join(sorted(missing))}.bvh; a take needs both hands' files")
     return files

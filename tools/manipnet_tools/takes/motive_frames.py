@@ -41,7 +41,7 @@ def read_frames(text: str) -> Table:
     for row, (_, _, bodies) in zip(values, frames, strict=True):
         for place, identity in enumerate(names):
             row[7 * place : 7 * place + 7] = bodies.get(identity, np.nan)
-    rate_hz = round(float(np.diff(numbers)[0] / np.median(np.diff(times_s))), 3)
+    rate_hz = round(float(np.ptp(numbers) / np.ptp(times_s)), 3)
     bodies = {name: _columns(7 * place) for place, name in enumerate(names.values())}
     return Table({"Export Frame Rate": f"{rate_hz}"}, bodies, numbers, times_s, values)
 

@@ -11,6 +11,7 @@ import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -19,6 +20,11 @@ from manipnet.geometry import Array
 
 TYPES: Final = ("rigid body", "bone")
 PARTS: Final = ("Rotation", "Position")
+OPTIONS: Final = (
+    *("Capture Frame Rate", "Export Frame Rate", "Total Exported Frames"),
+    *("Rotation Type", "Length Units", "Coordinate Space"),
+)
+"""The keys of the first line that matter; an operator's notes with commas may stand between them."""
 LARGEST: Final = 1e12
 """A larger number is none that Motive writes."""
 _FIRST_LINE: Final = re.compile(r'\s*"?Format Version"?\s*([,;\t])')
@@ -60,8 +66,9 @@ def read_table(text: str, where: str) -> Table:
     except csv.Error as error:
         raise MotiveCsvError(f"is not a table ({error}); export the take again") from None
     options = {
-        key.strip(): value.replace(",", ".") if decimal_commas and _is_number(value) else value.strip()
-        for key, value in zip(lines[0][::2], lines[0][1::2], strict=False)
+        key: value.replace(",", ".") if decimal_commas and _is_number(value) else value
+        for key, value in pairwise(map(str.strip, lines[0]))
+        if key in OPTIONS
     }
     first = next((i for i, line in enumerate(lines) if line and line[0].strip().lower() == "frame"), None)
     if first is None:

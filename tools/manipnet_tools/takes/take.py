@@ -29,7 +29,7 @@ RESTART_S: Final = 0.5
 
 
 class TakeError(ValueError):
-    """A take that cannot be read; the text names the file, the place and what was expected."""
+    """A take cannot be read; the text names the file, the place and what was expected."""
 
 
 @dataclass(frozen=True)
@@ -99,9 +99,7 @@ def read_take(path: Path | str, keep: Collection[str] = (), up: Literal["y", "z"
 def _unknown(suffix: str) -> str:
     """Why a file is not a take."""
     if suffix == ".bvh":
-        return (
-            "a single BVH file is not a take, which is the folder that holds it; `manipnet import` reads single files"
-        )
+        return "a single BVH file is not a take; give its folder, with leftHand.bvh, rightHand.bvh and the objects"
     if suffix in (".fbx", ".c3d", ".tak"):
         return f"{suffix} files cannot be read; export the take from its program as CSV"
     return "unknown kind of take"

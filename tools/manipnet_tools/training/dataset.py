@@ -106,7 +106,8 @@ def captured_hands(take: Take, shapes: dict[str, Shape], sides: Sequence[Side] =
     """The hands of a take with captured fingers, each with the object that it handles; `shapes` by object name."""
     subject = shipped_hand()
     hands = []
-    for side, other in (("right", "left"), ("left", "right")):
+    pairs: tuple[tuple[Side, Side], ...] = (("right", "left"), ("left", "right"))
+    for side, other in pairs:
         if side not in sides:
             continue
         name = handled(take, side, shapes)
