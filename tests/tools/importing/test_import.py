@@ -263,7 +263,7 @@ def test_dexterhand_without_joints_says_how_to_make_them(tmp_path: Path, capsys:
     printed = " ".join(capsys.readouterr().err.split())
     assert "holds parameters of MANO, not joints" in printed
     assert "python -m Dataset.visualize_2bvh" in printed
-    assert "the object turns in itself; takes have rigid objects only" in printed
+    assert "the object is not rigid, and takes can only have rigid objects" in printed
 
 
 def test_nothing_in_a_pickle_is_run(tmp_path: Path) -> None:

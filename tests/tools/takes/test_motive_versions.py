@@ -157,7 +157,7 @@ def test_the_hands_of_two_skeletons_keep_their_names(tmp_path: Path) -> None:
     check(read(tmp_path, Export(names=names, kinds=("Bone", "Bone", "Rigid Body"))), names)
 
 
-def test_markers_are_no_bodies_and_bodies_without_rotation_are_reported(
+def test_markers_are_skipped_and_bodies_without_rotation_are_reported(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     export = Export(kinds=("Rigid Body", "Rigid Body", "Rigid Body Marker"))
@@ -165,7 +165,7 @@ def test_markers_are_no_bodies_and_bodies_without_rotation_are_reported(
     assert not caplog.records
     partial = Export(parts=(("Rotation", "Position"), ("Rotation", "Position"), ("Position",)))
     assert set(read(tmp_path, partial).bodies) == {"left_wrist", "right_wrist"}
-    assert "left out for want of rotation or position: Box" in caplog.text
+    assert "these bodies are left out because they lack rotation or position: Box" in caplog.text
 
 
 @pytest.mark.parametrize("other", ["Left Hand", "LeftWrist", "l_hand"])
@@ -256,7 +256,7 @@ def test_the_list_of_frames_of_the_first_versions_reads_the_same(tmp_path: Path)
     np.testing.assert_allclose(take.bodies["right_wrist"].poses, poses(1), atol=2e-6)
     with pytest.raises(TakeError, match="is left-handed; export it right-handed"):
         written(tmp_path, frame_list().replace("righthanded", "lefthanded"))
-    with pytest.raises(TakeError, match="line 8: is not a frame"):
+    with pytest.raises(TakeError, match="line 9: is not a frame"):
         written(tmp_path, frame_list().replace("frame,0,0.000000,3,", "frame,0,0.000000,30,"))
 
 

@@ -1,8 +1,8 @@
 """Reads takes in tables of joints, as gloves write them: one line a frame, and three columns for each joint.
 
 The first line names the columns: `time` in seconds, and `<joint>_x`, `<joint>_y`, `<joint>_z` with any name by which a
-joint is recognised, such as `LeftIndexProximal_x`. Seven columns `<object>_x … _z, _qx, _qy, _qz, _qw` are an object's
-pose. An empty cell is a lost joint. Other columns are passed over.
+joint is recognised, such as `LeftIndexProximal_x`. Seven columns `<object>_x … _z, _qx, _qy, _qz, _qw` hold the pose of
+an object. An empty cell means that a joint was lost. Other columns are ignored.
 """
 
 import csv
@@ -95,7 +95,7 @@ def _hands(parts: dict[str, dict[str, int]], numbers: Array, path: Path) -> dict
     for side in found:
         require_palm(side, {joint: name for (owner, joint), name in owners.items() if owner == side}, str(path))
     if not found:
-        raise ImportingError(f"{path}: no column is that of a hand's joint, such as LeftIndexProximal_x")
+        raise ImportingError(f"{path}: no column belongs to a joint of a hand, such as LeftIndexProximal_x")
     return found
 
 
@@ -104,7 +104,7 @@ def _with_places(parts: dict[str, dict[str, int]]) -> Iterable[str]:
 
 
 def _numbers(lines: list[list[str]], width: int, decimal_commas: bool, path: Path) -> Array:
-    """All cells `(T, width)`; those that are empty or no numbers are NaN."""
+    """All cells `(T, width)`; a cell that does not hold a number is NaN."""
     rows = [[_number(cell, decimal_commas) for cell in [*line, *[""] * width][:width]] for line in lines if any(line)]
     if len(rows) < 2:
         raise ImportingError(f"{path}: holds fewer than two frames")

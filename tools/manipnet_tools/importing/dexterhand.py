@@ -1,13 +1,13 @@
 """Reads DexterHand (Liang et al. 2026): a left hand that manipulates one object, 20 or 60 frames a second.
 
-A session `<object>_<number>-fps_<rate>.npz` keeps the poses of the object and its size in metres. Of the hand it keeps
-parameters of MANO, whose meaning is in files with a licence of their own; whoever has those makes joints with the
-authors' program, which writes beside the session `bvh/<session>_hand.bvh`:
+A session `<object>_<number>-fps_<rate>.npz` holds the poses of the object and its size in metres. The hand is stored as
+parameters of MANO. Turning them into joints requires the MANO model files, which have a licence of their own. With
+those files, the authors' program writes the joints to `bvh/<session>_hand.bvh` beside the session:
 
     python -m Dataset.visualize_2bvh --data_path <session>.npz
 
-The first frame of both is a reference pose in that program and is left out. The shapes are those of its viewer:
-centred, and cylinders stand along y. Source: github.com/PKU-MoCCA/dextercap.
+That program replaces the first frame by a reference pose, so the first frame is left out. The shapes of the objects
+are those of the authors' viewer: they are centred, and cylinders stand along y. Source: github.com/PKU-MoCCA/dextercap.
 """
 
 import io
@@ -34,7 +34,7 @@ ORIGIN: Final = Origin(
     "https://pku-mocca.github.io/Dextercap-Page",
 )
 LOST_M: Final = 900.0
-"""An object farther away than this was not seen; the files have -1000 there."""
+"""An object that was not seen is at -1000 m; anything farther away than this counts as not seen."""
 _NEEDED: Final = ("metadata", "object_translations", "object_orientations_quat_xyzw")
 
 
@@ -49,12 +49,12 @@ def open_dexterhand(folder: Path, hand: Hand) -> SourceSet:
 def _read(file: Path, hand: Hand) -> SourceTake:
     arrays, about = _session(file)
     if "RubiksCube" in file.stem:
-        raise ImportingError(f"{file}: the object turns in itself; takes have rigid objects only")
+        raise ImportingError(f"{file}: the object is not rigid, and takes can only have rigid objects")
     path = file.parent / "bvh" / f"{file.stem}_hand.bvh"
     if not path.is_file():
         raise ImportingError(
             f"{file}: holds parameters of MANO, not joints. Make {path} with the authors' program, which needs the "
-            f"files of MANO and their licence: python -m Dataset.visualize_2bvh --data_path {file.name}"
+            f"MANO model files and their licence: python -m Dataset.visualize_2bvh --data_path {file.name}"
         )
     try:
         motion = read_bvh(path)
@@ -114,7 +114,7 @@ def _mesh(file: Path) -> ClosedMesh:
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise ImportingError(f"{file}: its object {kind!r} has no usable size ({error})") from None
     if shape is None:
-        raise ImportingError(f"{file}: its object {kind!r} is of no known shape")
+        raise ImportingError(f"{file}: the shape of its object {kind!r} is unknown")
     return closed_mesh(shape.vertices, shape.faces, file.stem)
 
 

@@ -48,7 +48,7 @@ def require_palm(side: Side, names: dict[int, str], where: str) -> None:
 
 
 def _parse(name: str) -> tuple[Side | None, int | None, str] | None:
-    """Side, finger (None for the wrist) and part of a name; None if it is no joint of a hand."""
+    """Side, finger (None for the wrist) and part of a name; None if it does not name a joint of a hand."""
     words = [word.lower() for word in _WORD.findall(name.rpartition(":")[2])]
     if _BODY & set(words):
         return None

@@ -1,4 +1,4 @@
-"""The unit and handedness of files that do not say what theirs are: those in which their hands are hands."""
+"""Finds the unit and handedness of a file, which it does not state, from the size and shape of its hands."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -37,7 +37,7 @@ class Space:
 
 
 def find_space(hands: dict[Side, Array], hand: Hand) -> Space:
-    """The space of joints `(T, 21, 3)` in a file's own lengths. Raises `ImportingError`."""
+    """The unit and handedness of joints `(T, 21, 3)` in a file's own lengths. Raises `ImportingError`."""
     unit = _unit(hands, hand)
     sample: dict[Side, Array] = {side: _sample(UNITS_M[unit] * joints) for side, joints in hands.items()}
     better = {
@@ -59,8 +59,8 @@ def _unit(hands: dict[Side, Array], hand: Hand) -> str:
     unit = min(ratios, key=lambda unit: abs(np.log(max(ratios[unit], 1e-9))))
     if not SIZE_RATIOS[0] <= ratios[unit] <= SIZE_RATIOS[1]:
         raise ImportingError(
-            f"a middle finger is {np.median(lengths):.3g} long from the wrist to its last joint, which is that of a "
-            f"hand in no known unit ({', '.join(UNITS_M)}); check the order of the joints"
+            f"the middle fingers are {np.median(lengths):.3g} long, measured from the wrist to the last joint, "
+            f"and that does not fit a hand in any unit ({', '.join(UNITS_M)}); check the order of the joints"
         )
     return unit
 

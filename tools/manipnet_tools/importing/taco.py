@@ -38,7 +38,7 @@ def open_taco(folder: Path) -> SourceSet:
     if not files:
         reason = "holds no Hand_Poses_3D/<triplet>/<sequence>/hand_joints.npy; unpack Hand_Poses_3D.zip of TACO there"
         if (folder / "Hand_Poses").is_dir():
-            reason += "; Hand_Poses holds parameters of MANO, whose meaning is in files with a licence of their own"
+            reason += "; Hand_Poses holds parameters of MANO, which require model files with a licence of their own"
         raise ImportingError(f"{folder}: {reason}")
     sequences = {f"{file.parts[-3]}/{file.parts[-2]}": file for file in files}
     return SourceSet(
@@ -69,7 +69,7 @@ def _read(name: str, file: Path, objects: Path) -> SourceTake:
 
 
 def _poses(matrices: Array) -> Array:
-    """Poses `(T, 7)` with Y up from matrices `(T, 4, 4)` with Z up; NaN where a matrix is no pose."""
+    """Poses `(T, 7)` with Y up from matrices `(T, 4, 4)` with Z up; NaN where a matrix is not a rigid pose."""
     rotations, places = _Y_UP @ matrices[:, :3, :3].astype(np.float64), matrices[:, :3, 3] @ _Y_UP.T
     right = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
     right[right] = np.abs(np.linalg.det(rotations[right]) - 1.0) < 0.05

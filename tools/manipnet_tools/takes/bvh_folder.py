@@ -1,7 +1,7 @@
 """Reads a take in the layout of the ManipNet dataset: `leftHand.bvh`, `rightHand.bvh` and one `<object>.bvh` each.
 
-The dataset's own files are left-handed decimetres. A folder in another unit, or right-handed as `manipnet export
---right-handed` writes it, is recognised by the offsets of the hands' joints, which are those of a hand.
+The dataset's own files are left-handed and in decimetres. A folder in another unit, or right-handed as `manipnet export
+--right-handed` writes it, is recognised by the lengths and directions of the hands' bones.
 """
 
 import logging
@@ -59,13 +59,15 @@ def bvh_files(folder: Path) -> list[Path]:
 
 
 def _files(folder: Path) -> dict[str, BvhMotion]:
-    """All BVH files by name; those of the hands under the dataset's names, in whatever letters they are written."""
+    """All BVH files by name. The hands have the dataset's names, whether their files are written in capitals or not."""
     hands = {name.lower(): name for name in HANDS}
     files: dict[str, BvhMotion] = {}
     for path in bvh_files(folder):
         stem = hands.get(path.stem.lower(), path.stem)
         if stem in files:
-            raise BvhError(f"{folder}: two files are called {stem}.bvh but for capital letters; keep one of them")
+            raise BvhError(
+                f"{folder}: two files are called {stem}.bvh if capital letters are ignored; keep one of them"
+            )
         files[stem] = read_bvh(path)
     if wrists := {"left_wrist", "right_wrist"} & files.keys():
         raise BvhError(
@@ -105,7 +107,7 @@ def _in_order(bvh: BvhMotion, hand: Hand, path: Path) -> _Ordered:
     if len(bvh.joints) != len(expected) or set(found) != set(expected):
         names = " ".join(joint.name for joint in bvh.joints)
         unknown = [joint.name for joint in bvh.joints if _bare(joint.name) not in expected]
-        reason = f"; {unknown[0]!r} is none of them" if unknown else ""
+        reason = f"; {unknown[0]!r} is not one of them" if unknown else ""
         raise BvhError(f"{path}: joints must be {' '.join(expected)}, found {names}{reason}")
     order = [found[name] for name in expected]
     for name, j, parent in zip(expected, order, hand.parents[: hand.bone_count].tolist(), strict=True):
@@ -144,7 +146,7 @@ def _space(hands: dict[Side, _Ordered], hand: Hand, folder: Path) -> _Space:
     unit = min(ratios, key=lambda unit: abs(np.log(max(ratios[unit], 1e-9))))
     if not SIZE_RATIOS[0] <= ratios[unit] <= SIZE_RATIOS[1]:
         raise BvhError(
-            f"{folder}: the hands' offsets are in no known unit ({', '.join(UNITS_M)}), or not those of hands"
+            f"{folder}: the hands' bones have lengths that do not fit a hand in any unit ({', '.join(UNITS_M)})"
         )
     errors = {}
     for mirrored in (True, False):
@@ -154,7 +156,7 @@ def _space(hands: dict[Side, _Ordered], hand: Hand, folder: Path) -> _Space:
     mirrored = bool(errors[True] <= errors[False])
     if (unit, mirrored) != ("dm", True):
         handedness = "left-handed" if mirrored else "right-handed"
-        _log.info("%s: is read as %s and in %s, by the offsets of the hands' joints", folder, handedness, unit)
+        _log.info("%s: is read as %s and in %s, judging by the bones of the hands", folder, handedness, unit)
     return _Space(UNITS_M[unit], mirrored)
 
 

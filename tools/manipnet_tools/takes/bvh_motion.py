@@ -1,8 +1,8 @@
 """Reads motion files in BVH without loss, and without the conventions of any dataset.
 
-There is no standard. What programs write differs in line ends, spaces in names, the order of channels, the rounding of
-the frame time and the number of frames that is announced; all of that is read. Position channels stand in place of
-the offset of their joint, as in the files of MotionBuilder, Maya, Blender and the ManipNet dataset.
+BVH has no standard. Programs differ in line ends, spaces in names, the order of channels, the rounding of the frame
+time and the number of frames they announce; all of these variants are read. Position channels replace the offset of
+their joint, as in the files of MotionBuilder, Maya, Blender and the ManipNet dataset.
 """
 
 import logging

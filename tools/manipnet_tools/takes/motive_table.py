@@ -26,7 +26,7 @@ OPTIONS: Final = (
 )
 """The keys of the first line that matter; an operator's notes with commas may stand between them."""
 LARGEST: Final = 1e12
-"""A larger number is none that Motive writes."""
+"""Motive never writes a number this large."""
 _FIRST_LINE: Final = re.compile(r'\s*"?Format Version"?\s*([,;\t])')
 _log = logging.getLogger(__name__)
 
@@ -37,7 +37,7 @@ class MotiveCsvError(ValueError):
 
 @dataclass(frozen=True)
 class Columns:
-    """The columns of one body, by component: of the file, and after `read_table` those of `Table.values`."""
+    """The columns of one body, by component. In a `Table` they are columns of its `values`."""
 
     rotation: dict[str, int] = field(default_factory=dict)
     position: dict[str, int] = field(default_factory=dict)
@@ -45,7 +45,7 @@ class Columns:
 
 @dataclass(frozen=True)
 class Table:
-    """The first line's options, and of each of the T lines the frame number, the time and the cells of all bodies."""
+    """The options in the first line, and for each of T frames its number, its time and the cells of all bodies."""
 
     options: dict[str, str]
     bodies: dict[str, Columns]
@@ -159,7 +159,11 @@ def _bodies(head: list[list[str]], components: list[str], where: str) -> dict[st
             "turn on Rigid Bodies or Bones, with rotation and position, when exporting"
         )
     if partial := bodies.keys() - whole.keys():
-        _log.warning("%s: left out for want of rotation or position: %s", where, ", ".join(sorted(partial)))
+        _log.warning(
+            "%s: these bodies are left out because they lack rotation or position: %s",
+            where,
+            ", ".join(sorted(partial)),
+        )
     return whole
 
 

@@ -1,4 +1,4 @@
-"""Where the takes of a folder come from, and on what terms: the file `sources.json` beside the dataset's folders.
+"""Records where the takes of a folder come from and under which licence: `sources.json` beside the dataset's folders.
 
 A folder without the file is the ManipNet dataset itself.
 """
