@@ -144,7 +144,7 @@ def _y_up(take: Take) -> Take:
 
 
 def _read_recording(path: Path) -> Take:
-    """The longest run of body frames in a recording. A run ends where the time of its sender starts again."""
+    """The longest run of a recording's body frames, which ends where its sender restarted."""
     runs: list[dict[float, BodyFrame]] = []
     newest_s = np.inf
     for frame in read_bodies(path):
