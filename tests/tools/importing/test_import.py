@@ -348,6 +348,17 @@ def test_a_take_without_its_mesh_or_object_is_refused(tmp_path: Path, capsys: py
     assert "the object 'Mug' has no mesh; give --mesh Mug=FILE" in " ".join(capsys.readouterr().err.split())
 
 
+def test_objects_of_one_name_with_other_meshes_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for take, half in (("a", 0.04), ("b", 0.05)):
+        (tmp_path / f"{take}.csv").write_text(table())
+        write_box(tmp_path / f"{take}.obj", half)
+    run = ["import", "csv", "--out", str(tmp_path / "data")]
+    assert cli.main([*run, str(tmp_path / "a.csv"), "--mesh", f"Mug={tmp_path / 'a.obj'}"]) == 0
+    assert cli.main([*run, str(tmp_path / "b.csv"), "--mesh", f"Mug={tmp_path / 'b.obj'}"]) == 1
+    assert "is another mesh; rename the object Mug" in " ".join(capsys.readouterr().err.split())
+    assert [folder.name for folder in take_folders(tmp_path / "data")] == ["a"]
+
+
 def table_columns(t_s: np.ndarray, sides: tuple[Side, ...] = SIDES) -> dict[str, np.ndarray]:
     """A table in centimetres, with joints named as Rokoko names them, by column."""
     columns: dict[str, np.ndarray] = {"Frame": np.arange(len(t_s)), "Time": t_s + 12.0}

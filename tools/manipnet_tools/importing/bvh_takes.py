@@ -21,14 +21,18 @@ from manipnet_tools.takes.bvh_motion import BvhError, BvhMotion, read_bvh
 def bvh_take_folders(folder: Path) -> dict[str, Path]:
     """The folders of takes, by name. Raises `ImportingError`."""
     places = [folder, *sorted(path for path in folder.rglob("*") if path.is_dir())] if folder.is_dir() else []
-    takes = {place.name: place for place in places if bvh_files(place)}
+    takes = {
+        place.name if place == folder else place.relative_to(folder).as_posix(): place
+        for place in places
+        if bvh_files(place)
+    }
     if not takes:
         raise ImportingError(f"{folder}: holds no BVH files; a take is a folder with those of its hands and objects")
     return takes
 
 
-def read_bvh_take(folder: Path, hand: Hand) -> SourceTake:
-    """Read a take. Raises `ImportingError`."""
+def read_bvh_take(name: str, folder: Path, hand: Hand) -> SourceTake:
+    """Read the take in a folder. Raises `ImportingError`."""
     hands: dict[Side, Array] = {}
     objects: dict[str, Array] = {}
     motions: list[BvhMotion] = []
@@ -54,10 +58,10 @@ def read_bvh_take(folder: Path, hand: Hand) -> SourceTake:
         )
     frames, space = min(lengths), find_space(hands, hand)
     return SourceTake(
-        folder.name,
+        name,
         motions[0].rate_hz,
         {side: space.points(joints[:frames]) for side, joints in hands.items()},
-        {name: space.poses(poses[:frames]) for name, poses in objects.items()},
+        {stem: space.poses(poses[:frames]) for stem, poses in objects.items()},
     )
 
 

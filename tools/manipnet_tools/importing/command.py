@@ -64,7 +64,7 @@ def open_set(options: ImportOptions, hand: Hand) -> SourceSet:
     if options.kind == "dexterhand":
         return open_dexterhand(options.path, hand)
     meshes = {name: load_mesh(file, name=name) for name, file in named_files(options.mesh).items()}
-    origin = Origin(options.name or options.path.absolute().name, options.licence, "")
+    origin = Origin(options.name or options.path.absolute().with_suffix("").name, options.licence, "")
 
     def mesh(name: str) -> ClosedMesh:
         if name not in meshes:
@@ -76,7 +76,7 @@ def open_set(options: ImportOptions, hand: Hand) -> SourceSet:
         files, read = bvh_take_folders(options.path), read_bvh_take
     else:
         files, read = csv_take_files(options.path), read_csv_take
-    return SourceSet(origin, tuple(files), lambda name: read(files[name], hand), mesh)
+    return SourceSet(origin, tuple(files), lambda name: read(name, files[name], hand), mesh)
 
 
 def import_take(source: SourceSet, name: str, hand: Hand, data: Path) -> dict[str, TakeSource]:
@@ -89,9 +89,11 @@ def import_take(source: SourceSet, name: str, hand: Hand, data: Path) -> dict[st
         raise ImportingError("has no object; a take for training needs the poses of what the hands hold")
     meshes = {stem: source.mesh(stem) for stem in take.objects}
     fits: dict[Side, Fit] = {side: fit_hand(joints, side, hand) for side, joints in take.hands.items()}
-    parts = list(pieces(take, fits, _take_name(source.origin.name, name)))
+    parts = list(pieces(take, fits, _take_name(source.origin.name, take.name)))
     if not parts:
         raise ImportingError(f"has no {SHORTEST_S} s in which its hands and objects are all there")
+    for stem, mesh in meshes.items():
+        write_mesh(mesh, data, file_stem(stem))
     made = {}
     for part in parts:
         write_piece(part, hand, data)
@@ -100,14 +102,12 @@ def import_take(source: SourceSet, name: str, hand: Hand, data: Path) -> dict[st
         made[part.name] = TakeSource(
             origin.name, origin.licence, origin.attribution, origin.url, name, tuple(part.fits), error_mm
         )
-    for stem, mesh in meshes.items():
-        write_mesh(mesh, data, file_stem(stem))
     return made
 
 
 def _take_name(origin: str, name: str) -> str:
     """A name for a take that is a folder's name on every system."""
-    return re.sub(r"[^\w.-]+", "_", f"{origin} {name.rpartition('/')[2]}").strip("_").lower()
+    return re.sub(r"[^\w.-]+", "_", name if name == origin else f"{origin} {name}").strip("_").lower()
 
 
 def _report(name: str, made: dict[str, TakeSource], console: Console) -> None:

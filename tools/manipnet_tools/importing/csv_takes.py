@@ -31,14 +31,18 @@ RATES_HZ: Final = (10.0, 1000.0)
 def csv_take_files(path: Path) -> dict[str, Path]:
     """The files of takes, by name: `path` itself, or those in this folder. Raises `ImportingError`."""
     files = sorted(path.rglob("*")) if path.is_dir() else [path]
-    takes = {file.stem: file for file in files if file.suffix.lower() == ".csv" and file.is_file()}
+    takes = {
+        file.stem if file == path else file.relative_to(path).with_suffix("").as_posix(): file
+        for file in files
+        if file.suffix.lower() == ".csv" and file.is_file()
+    }
     if not takes:
         raise ImportingError(f"{path}: holds no CSV files")
     return takes
 
 
-def read_csv_take(path: Path, hand: Hand) -> SourceTake:
-    """Read a take. Raises `ImportingError`."""
+def read_csv_take(name: str, path: Path, hand: Hand) -> SourceTake:
+    """Read the take in a file. Raises `ImportingError`."""
     try:
         text = read_text(path)
     except OSError as error:
@@ -59,7 +63,7 @@ def read_csv_take(path: Path, hand: Hand) -> SourceTake:
     }
     space = find_space(hands, hand)
     return SourceTake(
-        path.stem,
+        name,
         rate_hz,
         {side: space.points(joints) for side, joints in hands.items()},
         {name: space.poses(poses) for name, poses in objects.items()},

@@ -22,7 +22,7 @@ from manipnet.synthesis.synthesizer import hand_to_world
 from manipnet_tools.export.animation import Animation, hand_track
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.importing.retarget import START_RAD, Fit
-from manipnet_tools.importing.source import SourceTake
+from manipnet_tools.importing.source import ImportingError, SourceTake
 from manipnet_tools.takes.take import BodyTrack
 
 RATE_HZ: Final = 120.0
@@ -84,12 +84,15 @@ def write_piece(piece: Piece, hand: Hand, data: Path) -> None:
 
 
 def write_mesh(mesh: ClosedMesh, data: Path, name: str) -> None:
-    """Write the mesh of an object, unless it is there."""
+    """Write the mesh of an object. Raises `ImportingError` if the folder has another one of its name."""
     path = data / "meshes" / f"{name}.obj"
     path.parent.mkdir(parents=True, exist_ok=True)
     lines = [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in mesh.vertices.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + 1).tolist()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    text = "\n".join(lines) + "\n"
+    if path.is_file() and path.read_text(encoding="utf-8") != text:
+        raise ImportingError(f"{path} is another mesh; rename the object {name}, or write to another folder")
+    path.write_text(text, encoding="utf-8")
 
 
 def _poses_at(times_s: Array, poses: Array, wanted_s: Array) -> Array:

@@ -61,7 +61,7 @@ def _read(name: str, file: Path, objects: Path) -> SourceTake:
     frames = min(len(joints), *map(len, poses.values()))
     turned = joints[:frames].astype(np.float64) @ _Y_UP.T
     return SourceTake(
-        name,
+        name.rpartition("/")[2],
         RATE_HZ,
         {"left": turned[:, 0], "right": turned[:, 1]},
         {stem: _poses(matrices[:frames]) for stem, matrices in poses.items()},
