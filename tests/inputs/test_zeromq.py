@@ -1,6 +1,7 @@
 """Bodies over ZeroMQ, through real sockets on free loopback ports."""
 
 import json
+import threading
 
 import msgpack
 import pytest
