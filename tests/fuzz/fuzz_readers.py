@@ -10,6 +10,7 @@ import msgpack
 import natnet_writer as natnet
 from fuzz_damage import damaged, reshaped
 from fuzz_files import ACTORS, RIG, bundles, place_recording, place_rig, read_recording, recordings, toml
+from fuzz_takes import FILE_TARGETS
 from osc_writer import bundle, osc
 
 from manipnet.common.options import ConfigError
@@ -118,6 +119,7 @@ TARGETS = {
     "rig": Target(load_rig, [toml(RIG), toml(ACTORS)], ConfigError, (RIG, ACTORS), toml, place_rig),
     "recording": Target(read_recording, recordings(), RecordingError, place=place_recording),
 }
+TARGETS |= {name: Target(file.read, file.good, file.error, place=file.place) for name, file in FILE_TARGETS.items()}
 if _BUNDLES is not None:
     _META, _DOCUMENTS = _BUNDLES.meta, (json.loads(_BUNDLES.meta),)
     TARGETS |= {

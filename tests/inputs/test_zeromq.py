@@ -189,7 +189,7 @@ def test_a_push_socket_is_refused_as_the_wrong_type(receiver, telemetry, context
         push.connect(receiver.address)
         while "socket_type" not in telemetry.counts().get("connections_refused", {}):
             assert threading.Event().wait(0.02) is False
-    assert "a PUSH, for example): use a PUB socket" in caplog.text
+    assert "a PUSH, say): use a PUB socket that connects here" in caplog.text
     assert "keys" not in caplog.text
 
 

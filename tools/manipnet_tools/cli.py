@@ -91,6 +91,16 @@ VERBS = {
             "--data DATASET --model models/mine --json figures.json",
         ),
     ),
+    "import": Verb(
+        "make takes for training out of public sets and glove takes",
+        "manipnet_tools.importing.command",
+        "manipnet_tools.importing.options.ImportOptions",
+        (
+            'taco TACO --out DATA --only "(stir, *"            some of the TACO set (CC BY 4.0)',
+            "dexterhand DEXTERHAND --out DATA                 the DexterHand set, with the hands as BVH",
+            "bvh gloves --mesh Mug=mug.obj --out DATA         folders of a studio's own glove takes",
+        ),
+    ),
     "train": Verb(
         "train a model on captured takes",
         "manipnet_tools.training.train",

@@ -36,7 +36,7 @@ _CURVE_BYTES: Final = _GREETING_BYTES + 170
 """What a CURVE server has sent before the handshake is complete: its greeting and WELCOME (RFC 26)."""
 
 Refuse = Callable[[str], None]
-"""Called with the reason why a connection was refused or closed: handshake, socket_type, too_many or endless."""
+"""Called with the reason why a connection was refused: `handshake`, `socket_type`, `too_many` or `endless`."""
 
 
 @dataclass(slots=True)

@@ -19,8 +19,10 @@ from manipnet.tracking.tick import TICK_HZ
 from manipnet_tools.batch.job import Job, Outcome
 from manipnet_tools.batch.local import run_locally
 from manipnet_tools.commands.options import BatchOptions
+from manipnet_tools.takes.bvh_folder import bvh_files
 from manipnet_tools.takes.meshes import named_files
 from manipnet_tools.takes.rigged import read_rig
+from manipnet_tools.takes.take import TRACKED_FORMATS
 from manipnet_tools.terminal import open_console
 
 FILE_TAKES = (".csv", ".mcap", ".txt")
@@ -78,14 +80,24 @@ def plan(options: BatchOptions) -> list[Job]:
     model, rig = load_bundle(options.model).folder.absolute(), read_rig(options.rig, options.actor)
     names = take_names(options.folder, takes)
     return [
-        Job(name, take.absolute(), meshes, model, options.look_ahead, rig, options.out.absolute() / f"{name}.npz")
+        Job(
+            name,
+            take.absolute(),
+            meshes,
+            model,
+            options.look_ahead,
+            rig,
+            options.out.absolute() / f"{name}.npz",
+            options.up if take.suffix.lower() in TRACKED_FORMATS else "y",
+        )
         for take, name in zip(takes, names, strict=True)
     ]
 
 
 def find_takes(folder: Path) -> list[Path]:
     """All takes in a folder at any depth, the folder itself included."""
-    folders = [place for place in [folder, *folder.rglob("*")] if place.is_dir() and any(place.glob("*Hand.bvh"))]
+    places = [place for place in [folder, *folder.rglob("*")] if place.is_dir()]
+    folders = [place for place in places if any(file.stem.lower().endswith("hand") for file in bvh_files(place))]
     files = [file for file in folder.rglob("*") if file.suffix.lower() in FILE_TAKES and file.is_file()]
     return sorted([*folders, *(file for file in files if file.suffix.lower() != ".txt" or _is_trajectory(file))])
 

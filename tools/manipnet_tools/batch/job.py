@@ -14,6 +14,7 @@ from manipnet.common.atomic_file import replacing
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.commands.synthesize import read_shapes, synthesise, write_arrays
+from manipnet_tools.takes.bvh_folder import bvh_files
 from manipnet_tools.takes.rigged import RiggedTake, RigText, read_rigged
 from manipnet_tools.takes.rollout import tick_take
 from manipnet_tools.takes.take import TakeError
@@ -38,6 +39,9 @@ class Job:
     """The rig file, for a take that does not say which body is which."""
     out: Path
     """The file to write, .npz. A .json file of the same name holds a hash of everything the result depends on."""
+
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in the take."""
 
     @property
     def note(self) -> Path:
@@ -88,13 +92,13 @@ def prepare(job: Job) -> Prepared:
 
     Raises `TakeError`, `ConfigError`, `BundleError` and `OSError`.
     """
-    rigged = read_rigged(job.take, job.rig)
+    rigged = read_rigged(job.take, job.rig, job.up)
     take, rig_meshes = rigged.take, {} if job.rig is None else job.rig.meshes
     meshes = {name: file for name, file in sorted(job.meshes.items()) if name in take.objects}
     if not meshes and job.meshes and job.take.suffix.lower() != ".mcap" and not rig_meshes:
         objects, given = ", ".join(take.objects) or "none", ", ".join(job.meshes)
         raise TakeError(f"{job.take}: its objects are {objects}, but --mesh names {given}")
-    digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s}".encode())
+    digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s} {job.up}".encode())
     if job.rig is not None:
         digest.update(f"{job.rig.actor} {job.rig.text}".encode())
     of_rig = ((name, file.path) for name, file in sorted(rig_meshes.items()))
@@ -105,7 +109,7 @@ def prepare(job: Job) -> Prepared:
 
 def take_files(take: Path) -> list[Path]:
     """The files that make up a take."""
-    return sorted(take.glob("*.bvh")) if take.is_dir() else [take]
+    return bvh_files(take) if take.is_dir() else [take]
 
 
 def finished(prepared: Prepared) -> Outcome | None:

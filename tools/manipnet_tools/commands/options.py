@@ -45,6 +45,8 @@ class ReplayOptions:
     """Repeat until stopped; the time stamps keep rising."""
     rate: Annotated[float | None, _optional("HZ")] = None
     """Resample to this rate; by default the take keeps its own."""
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in a Motive CSV or a recording; the file does not say which."""
 
     def check(self) -> None:
         require_take(self.take)
@@ -116,6 +118,8 @@ class SynthesizeOptions:
     """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in a Motive CSV or a recording; the file does not say which."""
 
     def check(self) -> None:
         require_take(self.take)
@@ -148,6 +152,8 @@ class BatchOptions:
     """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in a Motive CSV or a recording; the file does not say which."""
     jobs: Annotated[int | None, _optional("N")] = None
     """Number of takes at the same time on this machine; by default one per processor."""
     ray: Annotated[str | None, _optional("ADDRESS")] = None

@@ -23,7 +23,7 @@ SHOW_S = 0.2
 
 def run(options: ReplayOptions) -> None:
     """Play to the end, or until stopped. Raises `TakeError`, `ConfigError` and `PlayError`."""
-    take = read_take(options.take)
+    take = read_take(options.take, up=options.up)
     if options.rate is not None:
         take = resample(take, options.rate)
     frames = list(take_frames(take))

@@ -26,7 +26,7 @@ def run(options: SynthesizeOptions) -> None:
     console = open_console()
     with console.status("loading take, meshes and model"):
         rig = read_rig(options.rig, options.actor)
-        rigged = read_rigged(options.take, rig)
+        rigged = read_rigged(options.take, rig, options.up)
         take = rigged.take
         shapes = read_shapes(options.mesh, take, options.take, rig)
         synthesizer = Synthesizer(load_bundle(options.model))

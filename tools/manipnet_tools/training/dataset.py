@@ -11,7 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from manipnet.geometry import Array, continuous_quats, mirror_points, mirror_poses, mirror_quats, quat_to_matrix
+from manipnet.geometry import (
+    SIDES,
+    Array,
+    Side,
+    continuous_quats,
+    invert,
+    mirror_points,
+    mirror_poses,
+    mirror_quats,
+    quat_to_matrix,
+    transform,
+)
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import angles_from_rotations, forward_kinematics
 from manipnet.synthesis.model.features import Windows, features, joint_distances, pose_outputs
@@ -19,11 +30,14 @@ from manipnet.synthesis.model.layout import WINDOW_STEP_S
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import Shape, load_shape
 from manipnet_tools.takes.dataset import mesh_file, take_folders
+from manipnet_tools.takes.sources import captured_sides
 from manipnet_tools.takes.take import Take, read_take
 
 CAPTURE_HZ = 120
 TICK_FRAMES = 2
 """Frames of the capture per tick of the server."""
+HANDLED_FRAMES = 200
+"""Frames of a take by which the object that a hand handles is found."""
 _WINDOW_FRAMES = round(WINDOW_STEP_S * CAPTURE_HZ) * np.arange(-10, 11)
 
 
@@ -88,11 +102,15 @@ def continuous(poses: Array) -> Array:
     return np.concatenate([poses[:, :3], continuous_quats(poses[:, 3:])], axis=1)
 
 
-def captured_hands(take: Take, shapes: dict[str, Shape]) -> list[CapturedHand]:
-    """Both hands of a take with captured fingers; `shapes` by object name."""
-    name, subject = take.objects[0], shipped_hand()
+def captured_hands(take: Take, shapes: dict[str, Shape], sides: Sequence[Side] = SIDES) -> list[CapturedHand]:
+    """The hands of a take with captured fingers, each with the object that it handles; `shapes` by object name."""
+    subject = shipped_hand()
     hands = []
-    for side, other in (("right", "left"), ("left", "right")):
+    pairs: tuple[tuple[Side, Side], ...] = (("right", "left"), ("left", "right"))
+    for side, other in pairs:
+        if side not in sides:
+            continue
+        name = handled(take, side, shapes)
         mirrored = side == "left"
         quats = take.fingers[side].rotations
         wrist, obj = take.bodies[f"{side}_wrist"].poses, take.bodies[name].poses
@@ -118,6 +136,20 @@ def captured_hands(take: Take, shapes: dict[str, Shape]) -> list[CapturedHand]:
     return hands
 
 
+def handled(take: Take, side: Side, shapes: dict[str, Shape]) -> str:
+    """The object that a hand handles in a take: the one to which its knuckles and fingertips are nearest on average."""
+    if len(shapes) == 1:
+        return next(iter(shapes))
+    frames = slice(None, None, max(len(take.time_s) // HANDLED_FRAMES, 1))
+    joints = take.fingers[side].positions[frames]
+
+    def distance_m(name: str) -> float:
+        local = transform(invert(take.bodies[name].poses[frames])[:, None], joints)
+        return float(np.maximum(shapes[name].signed_distance(local.reshape(-1, 3))[0], 0.0).mean())
+
+    return min(shapes, key=distance_m)
+
+
 def load_captured_hands(data: Path, takes: Sequence[str] = ()) -> list[CapturedHand]:
     """All hands of the takes in `data/BVH`, or of those named, with meshes from `data/meshes`.
 
@@ -126,7 +158,8 @@ def load_captured_hands(data: Path, takes: Sequence[str] = ()) -> list[CapturedH
     hands = []
     for folder in take_folders(data, takes):
         take = read_take(folder)
-        hands += captured_hands(take, {name: load_shape(mesh_file(data, name)) for name in take.objects})
+        shapes = {name: load_shape(mesh_file(data, name)) for name in take.objects}
+        hands += captured_hands(take, shapes, captured_sides(data, folder.name))
     return hands
 
 

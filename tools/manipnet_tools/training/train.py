@@ -3,6 +3,7 @@
 import logging
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -10,6 +11,7 @@ import torch
 
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.layout import layout_of
+from manipnet_tools.takes.sources import licence_of
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, Samples, load_captured_hands
 from manipnet_tools.training.model import ManipNet, normalisation
@@ -112,5 +114,6 @@ def trained(
 
 def run(options: TrainOptions) -> None:
     """Train and write the bundle. Raises `DataError`, `TakeError` and `MeshError`."""
-    hands = load_captured_hands(options.data, options.takes())
-    save_bundle(train(hands, options.training, options.share), options.out)
+    names = options.takes()
+    trained = train(load_captured_hands(options.data, names), options.training, options.share)
+    save_bundle(replace(trained, licence=licence_of(options.data, names)), options.out)

@@ -9,11 +9,10 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.bundle import write_bundle
+from manipnet_tools.takes.sources import MANIPNET_LICENCE
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.model import ManipNet, export_onnx
 from manipnet_tools.training.quantise import halve_weights
-
-LICENCE = "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +32,8 @@ class Trained:
     """Share of each take that was used, from its start."""
     seconds: float
     """Time that training took."""
+    licence: str = MANIPNET_LICENCE
+    """The terms of the takes, which are those of the model."""
 
 
 def save_bundle(trained: Trained, folder: Path) -> None:
@@ -49,6 +50,6 @@ def save_bundle(trained: Trained, folder: Path) -> None:
         "response": trained.config.response,
         "limits_rad": np.round(trained.limits, 6).tolist(),
         "training": training,
-        "licence": LICENCE,
+        "licence": trained.licence,
     }
     write_bundle(folder, halve_weights(export_onnx(trained.model)), trained.hand, meta)
