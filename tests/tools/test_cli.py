@@ -72,6 +72,8 @@ MISTYPED = [
         "export gone --format csv --out a.csv",
         "export . --format csv --out gone/a.csv",
         "export . --format gltf --out a.glb --mesh Box=gone.obj",
+        "import bvh gone --out a",
+        "import bvh . --mesh Box=gone.obj --out a",
         "evaluate --data gone",
         "train --data gone --out a",
         "ablate --data gone --out a",

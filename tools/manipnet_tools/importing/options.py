@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from manipnet_tools.commands.checks import require_meshes
+
 
 @dataclass(frozen=True)
 class ImportOptions:
@@ -31,6 +33,7 @@ class ImportOptions:
     """bvh and csv: what the set is called; by default as the folder or file."""
 
     def check(self) -> None:
-        """Raise `OSError` for a path that does not exist."""
+        """Raise `OSError` or `ConfigError` for a path that does not exist."""
         if not self.path.exists():
             raise FileNotFoundError(f"{self.path}: no such file or folder")
+        require_meshes(self.mesh)
