@@ -13,6 +13,7 @@ from pathlib import Path
 from manipnet import __version__, inputs, outputs
 from manipnet.common.options import ConfigError, options_of
 from manipnet.common.text_output import accept_any_text
+from manipnet.config.files import check_files
 from manipnet.config.flags import add_flags, read_flags
 from manipnet.config.settings import (
     FILES,
@@ -26,6 +27,7 @@ from manipnet.config.settings import (
     server_config,
 )
 from manipnet.runtime.memory import check_address_space, share_arenas
+from manipnet.synthesis.model.shipped import BundleError
 
 EPILOG = """examples:
   manipnet-serve --demo                                   play a recorded performance, over and over
@@ -84,8 +86,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(describe(config), end="")
             return 0
         check(config)
+        check_files(config)
         check_address_space()
-    except ConfigError as error:
+    except (ConfigError, BundleError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
     return _serve(config, arguments.log_format == "json")
@@ -132,7 +135,6 @@ def _serve(config: ServerConfig, json_log: bool) -> int:
     from manipnet.runtime.console import Console
     from manipnet.runtime.signals import stop_on_signals
     from manipnet.server import Server
-    from manipnet.synthesis.model.bundle import BundleError
     from manipnet.synthesis.objects.mesh import MeshError
 
     console = Console(as_json=json_log)

@@ -10,16 +10,19 @@ import msgpack
 import natnet_writer as natnet
 from fuzz_damage import damaged, reshaped
 from fuzz_files import ACTORS, RIG, bundles, place_recording, place_rig, read_recording, recordings, toml
+from fuzz_takes import FILE_TARGETS
 from osc_writer import bundle, osc
 
 from manipnet.common.options import ConfigError
 from manipnet.config.rig_reader import load_rig
-from manipnet.inputs.natnet.frames import read_body_names, read_frame
+from manipnet.inputs.natnet.definitions import read_definitions
+from manipnet.inputs.natnet.frames import read_frame
 from manipnet.inputs.natnet.protocol import read_echo, read_packet, read_server_info
 from manipnet.inputs.osc.assembler import FrameAssembler
 from manipnet.inputs.osc.packet import split_packet
 from manipnet.recording.mcap_file import RecordingError
-from manipnet.synthesis.model.bundle import BundleError, load_bundle
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import BundleError
 from manipnet.wire.bodies import MessageError, parse_bodies
 
 VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5)]
@@ -73,7 +76,7 @@ def _natnet(data: bytes) -> object:
         case 1:
             return read_server_info(payload)
         case 5:
-            return read_body_names(payload, version)
+            return read_definitions(payload, version)
         case 7:
             return read_frame(payload, version)
         case 13:
@@ -116,6 +119,7 @@ TARGETS = {
     "rig": Target(load_rig, [toml(RIG), toml(ACTORS)], ConfigError, (RIG, ACTORS), toml, place_rig),
     "recording": Target(read_recording, recordings(), RecordingError, place=place_recording),
 }
+TARGETS |= {name: Target(file.read, file.good, file.error, place=file.place) for name, file in FILE_TARGETS.items()}
 if _BUNDLES is not None:
     _META, _DOCUMENTS = _BUNDLES.meta, (json.loads(_BUNDLES.meta),)
     TARGETS |= {

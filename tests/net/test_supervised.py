@@ -189,6 +189,7 @@ def test_a_request_whose_handling_fails_costs_only_itself(telemetry):
             client.setsockopt(zmq.LINGER, 0)
             client.connect(control.address)
             client.send(b"bad")
+            wait_for(lambda: "frames_dropped" in telemetry.counts())
             assert ask(control.address, {"op": "ping"}) == {"t": 1.0}
     finally:
         control.stop()

@@ -70,6 +70,19 @@ def test_a_folder_adds_to_the_library_and_comes_before_it(folder: Path) -> None:
         catalog.shape("spoon")
 
 
+def test_files_of_the_folder_that_are_no_objects_are_named_with_the_reason(folder: Path) -> None:
+    catalog = ObjectCatalog(folder)
+    box(folder / "cup.obj", 0.05)
+    box(folder / "cup.ply", 0.06)
+    (folder / "mug.fbx").touch()
+    (folder / "notes.txt").write_text("no mesh")
+    assert "cup" not in catalog.names(), "neither file is taken for the other"
+    problems = catalog.problems()
+    assert set(problems) == {"cup.obj", "cup.ply", "mug.fbx"}
+    assert problems["cup.ply"] == "cup.obj and cup.ply would be the same object; rename one of them"
+    assert "is FBX, which cannot be read; open it in Blender" in problems["mug.fbx"]
+
+
 def test_a_rigs_mesh_comes_before_the_folders(folder: Path, tmp_path: Path) -> None:
     box(folder / "crate.stl", 0.05)
     box(tmp_path / "crate.stl", 0.08)

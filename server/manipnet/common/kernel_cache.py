@@ -1,8 +1,8 @@
-"""Checks the folder in which numba keeps compiled code: numba ends the program when it meets a file that is cut.
+"""Checks the folder in which numba keeps compiled code: numba crashes when it reads a file that was cut off.
 
-A manifest holds the SHA-256 of every file, and is written when everything is compiled. What has changed since, which
-another process may have added rightly, gets a lighter check: numba's files are pickles, of which all instructions must
-be there up to the last byte. Nothing is unpickled here.
+A manifest holds the SHA-256 of every file, and is written when everything is compiled. A file that has
+changed since, perhaps because another process added it, gets a lighter check: numba's files are pickles, and all of
+their instructions must be there up to the last byte. Nothing is unpickled here.
 """
 
 import hashlib

@@ -1,4 +1,4 @@
-"""Standard output and standard error for any text, whatever their encoding."""
+"""Lets standard output and standard error accept any text, whatever their encoding."""
 
 import io
 import os

@@ -109,7 +109,7 @@ class Control:
 
 
 class _Door:
-    """The bound socket, and the way from the threads that meet requests to it, in the same context."""
+    """The bound socket, and the internal sockets through which other threads send answers, in the same context."""
 
     def __init__(self, bound: BoundSocket) -> None:
         self.bound = bound

@@ -41,9 +41,15 @@ class SessionRequests:
     """Most operations of `docs/protocol.md`, Control."""
 
     def __init__(
-        self, session: str, bundle: Bundle, actors_proxy: ActorsProxy, catalog: ObjectCatalog, telemetry: Telemetry
+        self,
+        session: str,
+        bundle: Bundle,
+        solver: str,
+        actors_proxy: ActorsProxy,
+        catalog: ObjectCatalog,
+        telemetry: Telemetry,
     ) -> None:
-        self._session, self._bundle = session, bundle
+        self._session, self._bundle, self._solver = session, bundle, solver
         self._proxy, self._actors = actors_proxy, actors_proxy.actors
         self._catalog, self._telemetry = catalog, telemetry
         self._started_s = time.monotonic()
@@ -69,6 +75,7 @@ class SessionRequests:
             "session": self._session,
             "model": self._bundle.name,
             "model_hash": self._bundle.model_hash,
+            "solver": self._solver,
             "tick_hz": TICK_HZ,
             "actors": [actor.config.name for actor in self._actors],
             "joint_names": list(JOINT_NAMES),
@@ -80,7 +87,8 @@ class SessionRequests:
     def _status(self, _: Request) -> dict[str, Any]:
         now_s = time.monotonic()
         report = self._proxy.ask(lambda: status(self._actors, self._telemetry, now_s))
-        return {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s, **report}
+        about = {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s}
+        return {**about, "model": self._bundle.name, "solver": self._solver, **report}
 
     def _objects(self, _: Request) -> dict[str, Any]:
         def carried() -> dict[str, Any]:

@@ -45,7 +45,7 @@ class HalfOpen:
 
 
 class _Connection(ServerConnection):
-    """A connection that tells when it begins and ends, and whether the client has sent anything."""
+    """A connection that reports when it begins and ends, and whether the client has sent anything."""
 
     def __init__(self, half_open: HalfOpen, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)

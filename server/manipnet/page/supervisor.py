@@ -41,7 +41,7 @@ LASTED_S: Final = 60.0
 
 _log = logging.getLogger(__name__)
 Submit = Callable[[list[bytes], Callable[[bytes], object]], None]
-"""Meets a request, and gives the answer to the function, on any thread."""
+"""Handles a request, and passes the answer to the function, on any thread."""
 
 
 class LivePage:

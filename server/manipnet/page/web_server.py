@@ -42,7 +42,7 @@ Dropped = Callable[[str, bytes], str]
 _log = logging.getLogger(__name__)
 
 
-class Server(viser.ViserServer):
+class PageServer(viser.ViserServer):
     """Viser without its public tunnel, which any visitor could open otherwise."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
@@ -50,13 +50,13 @@ class Server(viser.ViserServer):
         return None
 
 
-def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server:
+def open_server(listener: socket.socket, label: str, dropped: Dropped) -> PageServer:
     """Serve on a socket that already listens; on loopback, only pages of this machine may connect.
 
     `dropped` receives the name and content of a file that an operator dropped on the page, and returns a message.
     """
     with _served_on(listener, dropped):
-        return Server(host="127.0.0.1", port=0, label=label, verbose=False)
+        return PageServer(host="127.0.0.1", port=0, label=label, verbose=False)
 
 
 @contextlib.contextmanager

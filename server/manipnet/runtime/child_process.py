@@ -1,4 +1,4 @@
-"""A function in a process of its own, with a pipe to it.
+"""Runs a function in a process of its own, with a pipe to it.
 
 The child starts from a fresh interpreter, so that it shares no locks and no threads with the server. It ignores SIGINT:
 a Ctrl-C in a terminal reaches every process there, but it is for the server, which then ends its children. If the
@@ -47,6 +47,11 @@ class ChildProcess:
             self._process.start()
         except Exception as error:
             self._error = error
+
+    @property
+    def exit_code(self) -> int | None:
+        """Its exit status, or the negative number of the signal that ended it; None while it runs."""
+        return self._process.exitcode
 
     def close(self, timeout_s: float | None = None) -> None:
         """Close the pipe and wait for the end of the child, at most `timeout_s`."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from manipnet.runtime.shape_process import make_shape
+from manipnet.synthesis.objects.foreign import SUFFIXES, foreign_format
 from manipnet.synthesis.objects.library import library_file, library_names
 from manipnet.synthesis.objects.mesh import FORMATS, MeshError
 from manipnet.synthesis.objects.shape import Shape
@@ -100,9 +101,18 @@ class ObjectCatalog:
             return tuple(self._shapes.values())
 
     def problems(self) -> dict[str, str]:
-        """By file name, why the newest content of a file cannot be used; the shape from before stays in use."""
+        """By file name, why the newest content of a file cannot be used; the shape from before stays in use.
+
+        Files of the folder are among them that are meshes of formats that are not read, or that share a name.
+        """
+        files = self._files()
+        problems = {path.name: f"{path}: {reason}" for path in files if (reason := _foreign(path)) is not None}
+        for same in _by_name(files).values():
+            if len(same) > 1:
+                names = " and ".join(path.name for path in same)
+                problems |= {path.name: f"{names} would be the same object; rename one of them" for path in same}
         with self._lock:
-            return {source.path.name: text for source, text in self._problems.items()}
+            return problems | {source.path.name: text for source, text in self._problems.items()}
 
     def changed(self) -> list[tuple[Shape, Shape]]:
         """Build the shapes of changed files again; returns the old and the new shape of each.
@@ -115,13 +125,16 @@ class ObjectCatalog:
         return [(old, new) for old, new in pairs if new is not None and new.content_hash != old.content_hash]
 
     def _folder_files(self) -> dict[str, Path]:
+        """The files of the folder by the names of their objects, without those that share a name."""
+        return {name: same[0] for name, same in _by_name(self._files()).items() if len(same) == 1}
+
+    def _files(self) -> list[Path]:
         if self._folder is None:
-            return {}
+            return []
         try:
-            paths = sorted(self._folder.iterdir())[:MAX_FOLDER_FILES]
+            return sorted(self._folder.iterdir())[:MAX_FOLDER_FILES]
         except OSError:
-            return {}
-        return {path.stem: path for path in paths if path.suffix.lower() in FORMATS}
+            return []
 
     def _has_settled(self, source: Source) -> bool:
         """Whether a file differs from what was built and has not changed since the last look."""
@@ -187,6 +200,20 @@ class ObjectCatalog:
 
 def _triangles(shapes: Iterable[Shape]) -> int:
     return sum(len(shape.mesh.faces) for shape in shapes)
+
+
+def _by_name(files: list[Path]) -> dict[str, list[Path]]:
+    """The mesh files by the names of their objects."""
+    found: dict[str, list[Path]] = {}
+    for path in files:
+        if path.suffix.lower() in FORMATS:
+            found.setdefault(path.stem, []).append(path)
+    return found
+
+
+def _foreign(path: Path) -> str | None:
+    """Why a file that is called like a mesh of another format cannot be read."""
+    return foreign_format(path) if path.suffix.lower() in SUFFIXES else None
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:
