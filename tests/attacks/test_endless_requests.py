@@ -79,8 +79,9 @@ def test_a_long_mesh_build_lets_others_be_answered(server: LiveServer, tmp_path:
     paused = 0
     while not done.is_set() and paused < 20:
         assert server.ask({"op": "pause"})["paused"] is True
+        assert server.ask({"op": "select_object", "body": "Box", "object": "cube"})["object"] == "cube"
         paused += 1
-    assert not done.is_set(), "pause had to wait for the mesh"
+    assert not done.is_set(), "a request had to wait for the mesh"
     thread.join()
 
 

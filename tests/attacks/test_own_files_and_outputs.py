@@ -143,3 +143,15 @@ def test_no_library_reports_home(tiny_bundle: Path, tmp_path: Path) -> None:
     end(server)
     left = [str(path) for path in home.rglob("*") if "Microsoft" in str(path) or "onnxruntime" in path.name.lower()]
     assert left == []
+
+
+def test_the_doctors_report_goes_into_a_file_of_any_encoding(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "manipnet_tools.cli", "doctor", "--seconds", "0.5"]
+    ports = ["--input-port", "0", "--osc-port", "0", "--control-port", "1"]
+    narrow = {**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    with open(tmp_path / "report.txt", "wb") as report:
+        ended = subprocess.run(
+            [*command, *ports], stdout=report, stderr=subprocess.PIPE, env=narrow, timeout=START_S, check=False
+        )
+    assert b"Traceback" not in ended.stderr
+    assert "nothing arrives" in (tmp_path / "report.txt").read_text(encoding="cp1252")

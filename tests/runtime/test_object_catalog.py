@@ -267,6 +267,7 @@ def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> Non
         assert "right" in scene.tick(-0.3, 0.1).scenes
     assert catalog.names()
     assert catalog.problems() == {}
+    assert catalog.shape("cube").name == "cube", "a shape that is there need not wait"
     assert builder.is_alive()
     finish.set()
     builder.join()

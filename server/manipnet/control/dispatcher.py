@@ -23,7 +23,7 @@ STORING_OPS: Final = ("calibrate", "place_object")
 """Operations that change the rig file on the server's machine unless the request has `"store": false`."""
 SLOW_OPS: Final = {
     "add_object": "objects",
-    "select_object": "objects",
+    "select_object": "selection",
     "record": "recording",
     "stop_recording": "recording",
     "calibrate": "rig",

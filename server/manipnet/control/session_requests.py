@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from manipnet import __version__
 from manipnet.actors.props import Prop
+from manipnet.common.file_names import is_encodable
 from manipnet.config.settings import SCALE_RANGE
 from manipnet.control.actors_proxy import ActorsProxy
 from manipnet.control.request import (
@@ -18,7 +19,6 @@ from manipnet.control.request import (
     body_key,
     choice,
     flag,
-    is_writable_name,
     number,
     quoted,
 )
@@ -132,7 +132,7 @@ class SessionRequests:
         file = request.get("file")
         if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH or "\0" in file:
             raise RequestError("file is missing or is not a path; give the path of a mesh on the server's machine")
-        if not is_writable_name(Path(file)):
+        if not is_encodable(Path(file)):
             raise RequestError(
                 f"file is {quoted(file)}, which this system cannot write in its encoding "
                 f"({sys.getfilesystemencoding()}); use ASCII letters, or start the server with PYTHONUTF8=1"

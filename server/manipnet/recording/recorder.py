@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from manipnet.actors.props import Prop
-from manipnet.control.request import Handler, Request, RequestError, is_writable_name
+from manipnet.common.file_names import is_device, is_encodable
+from manipnet.control.request import Handler, Request, RequestError
 from manipnet.recording.open_recording import OpenRecording, RecordingFailedError
 from manipnet.telemetry import Telemetry
 
 NAME: Final = re.compile(r"\w([\w .-]{0,62}[\w-])?")
 MIN_FREE_BYTES: Final = 64 << 20
 """Space for a recording to begin: about a minute of one actor."""
-DEVICES: Final = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])( *\..*)?", re.IGNORECASE)
-"""Names that stand for devices on Windows, whatever suffix they have."""
 
 About = Callable[[], tuple[dict[str, str], Sequence[Prop]]]
 """What a recording depends on: its metadata, and the props whose meshes it keeps."""
@@ -60,10 +59,10 @@ class Recorder:
                 f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
                 "not beginning or ending with a space or dot"
             )
-        if DEVICES.fullmatch(name):
+        if is_device(name):
             raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
         path = self._folder / (name.removesuffix(".mcap") + ".mcap")
-        if not is_writable_name(path):
+        if not is_encodable(path):
             raise RequestError(
                 f"name is {name!r}, which this system cannot write in its encoding ({sys.getfilesystemencoding()}); "
                 "use ASCII letters, or start the server with PYTHONUTF8=1"

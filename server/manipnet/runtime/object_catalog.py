@@ -147,12 +147,17 @@ class ObjectCatalog:
         return stamp == before
 
     def _built(self, source: Source) -> Shape:
-        with self._building:  # one shape at a time; a caller that needs no new shape does not wait for it
-            with self._lock:
-                shape = self._shapes.get(source)
-                if shape is not None:
-                    self._keep(shape)
-            return shape or self._build(source)
+        if (shape := self._known(source)) is not None:
+            return shape
+        with self._building:  # one shape at a time, and this one may have been built meanwhile
+            return self._known(source) or self._build(source)
+
+    def _known(self, source: Source) -> Shape | None:
+        with self._lock:
+            shape = self._shapes.get(source)
+            if shape is not None:
+                self._keep(shape)
+            return shape
 
     def _rebuilt(self, source: Source) -> Shape | None:
         try:
