@@ -2,6 +2,8 @@
 
 import os
 import queue
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +29,16 @@ SLOW = tuple(
     TESTS / place for place in ("fuzz", "tools/training", "tools/bench", "tools/doctor", "runtime/test_bad_network.py")
 )
 """Folders and files whose tests take a second each."""
+
+
+def pytest_configure() -> None:
+    """Let servers announce themselves where no doctor outside of the tests looks."""
+    os.environ["XDG_STATE_HOME"] = tempfile.mkdtemp(prefix="manipnet-tests-")
+
+
+def pytest_unconfigure() -> None:
+    """Leave nothing behind."""
+    shutil.rmtree(os.environ["XDG_STATE_HOME"], ignore_errors=True)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

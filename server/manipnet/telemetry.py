@@ -60,6 +60,9 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
 """Every counter with its one label and the values of it that are known without the protocols."""
 
 
+LOSSES: Final = ("frames_dropped", "bodies_rejected", "connections_refused")
+"""The counters of what is lost or refused, of which `losses` tells how often it happens at present."""
+
 STAGES: Final = ("sense", "infer", "ik", "encode", "total", "interval")
 """The durations that `Timings` records, in seconds. `total` runs from the arrival of the packet that a tick waited for
 until the tick's message is sent.
@@ -79,6 +82,7 @@ class Telemetry:
         self._lock = threading.Lock()
         self._labels = dict(LABELS)
         self._counts: Counter[tuple[str, str]] = Counter()
+        self._recent: dict[tuple[str, str], Recent] = {}
         self._gauges: list[GaugeSource] = []
         self._receivers: dict[str, Callable[[], Mapping[str, Any]]] = {}
 
@@ -93,6 +97,8 @@ class Telemetry:
             raise KeyError(f"{name}: {key} {value!r} is not declared; allowed are {', '.join(allowed)}")
         with self._lock:
             self._counts[name, value] += n
+            if name in LOSSES:
+                self._recent.setdefault((name, value), Recent()).note(n, time.monotonic())
 
     def declare(self, name: str, *values: str) -> None:
         """Let the label of the counter `name` take these values too."""
@@ -114,6 +120,16 @@ class Telemetry:
             result.setdefault(name, {})[value] = count
         return result
 
+    def losses(self) -> dict[str, dict[str, dict[str, float]]]:
+        """For each counter in `LOSSES` and each label value: the `count`, the present `rate_hz`, and the `age_s`."""
+        now_s = time.monotonic()
+        result: dict[str, dict[str, dict[str, float]]] = {}
+        with self._lock:
+            for (name, value), recent in sorted(self._recent.items()):
+                count = self._counts[name, value]
+                result.setdefault(name, {})[value] = {"count": count} | recent.report(now_s)
+        return result
+
     def add_gauges(self, source: GaugeSource) -> None:
         """Let `gauges` include what `source` measures; it is called on the thread that reads the gauges."""
         self._gauges.append(source)
@@ -133,6 +149,31 @@ class Telemetry:
         with self._lock:
             receivers = dict(self._receivers)
         return {name: report() for name, report in receivers.items()}
+
+
+class Recent:
+    """How often something happens at present, and when it happened for the last time."""
+
+    PERIOD_S: Final = 2.0
+
+    def __init__(self) -> None:
+        self._since_s = self._newest_s = float("-inf")
+        self._count, self._before_hz = 0, 0.0
+
+    def note(self, n: int, now_s: float) -> None:
+        """It has happened `n` times."""
+        if now_s - self._since_s >= self.PERIOD_S:
+            passed_s = now_s - self._since_s
+            self._before_hz = self._count / passed_s if passed_s < 2.0 * self.PERIOD_S else 0.0
+            self._since_s, self._count = now_s, 0
+        self._newest_s = now_s
+        self._count += n
+
+    def report(self, now_s: float) -> dict[str, float]:
+        """`rate_hz` and `age_s`."""
+        passed_s = now_s - self._since_s
+        rate_hz = self._count / passed_s if passed_s > 0.25 * self.PERIOD_S else self._before_hz or self._count
+        return {"rate_hz": rate_hz, "age_s": max(now_s - self._newest_s, 0.0)}
 
 
 class Timings:

@@ -117,6 +117,10 @@ class Actor:
         arriving = self._timeline.health(now_s)
         return {role: arriving.get(role, BodyHealth(0.0, np.inf)) for role in self._roles.names()}
 
+    def body_keys(self) -> dict[str, BodyKey]:
+        """The body of each wrist and prop, by id or name."""
+        return self._roles.keys()
+
     # --- bodies and props
 
     def expected(self) -> list[BodyKey]:

@@ -27,6 +27,13 @@ class BodyRoles:
         """Every role that a body plays, wrists first."""
         return list(dict.fromkeys(self._roles.values()))
 
+    def keys(self) -> dict[str, BodyKey]:
+        """The body of each role, by id or name, as the rig or a request gave it."""
+        first: dict[str, BodyKey] = {}
+        for key, role in self._roles.items():
+            first.setdefault(role, key)
+        return first
+
     def role(self, body: BodyKey) -> str | None:
         """The role of a body, which is given by its key in the stream or by the role itself; None if it has none."""
         return self._roles.get(body) or (str(body) if body in self._roles.values() else None)

@@ -8,6 +8,7 @@ from typing import Any, Final
 from manipnet.control.request import Handler, Request, RequestError, number
 from manipnet.inputs.declaration import Receiver
 from manipnet.inputs.sender_stats import SenderStats
+from manipnet.runtime.diagnosis.diagnose import diagnose
 from manipnet.telemetry import Gauge
 from manipnet.wire.bodies import MessageError, check_name
 
@@ -19,7 +20,7 @@ class Peers:
     """Reports who is connected to a server. From any thread."""
 
     def __init__(self, senders: SenderStats) -> None:
-        self._senders = senders
+        self.senders = senders
         self.receivers: Mapping[str, Receiver] = {}
         """The receivers by their names in `status`."""
         self.connected: Callable[[], Mapping[str, int]] = dict
@@ -29,7 +30,12 @@ class Peers:
 
     def handlers(self, status: Handler) -> dict[str, Handler]:
         """The operations `ping` and `status`; the latter adds the peers to the answer of the given handler."""
-        return {"ping": self._ping, "status": lambda request: {**status(request), **self._report()}}
+        return {"ping": self._ping, "status": lambda request: self._diagnosed({**status(request), **self.report()})}
+
+    @staticmethod
+    def _diagnosed(report: dict[str, Any]) -> dict[str, Any]:
+        """A report with what is wrong with it, as `manipnet doctor` shows it."""
+        return {**report, "doctor": [finding.as_map() for finding in diagnose(report)]}
 
     def gauges(self) -> Iterator[Gauge]:
         """What is measured at this moment."""
@@ -56,9 +62,11 @@ class Peers:
                 self._clocks[name] = (offset_s, uncertainty_s, now_s)
         return {"t": now_s}
 
-    def _report(self) -> dict[str, Any]:
+    def report(self) -> dict[str, Any]:
+        """The senders, the receivers with their addresses, the connections and the clocks of clients."""
         now_s = time.monotonic()
-        report: dict[str, Any] = {"senders": self._senders.report(now_s), "connections": self._connections()}
+        report: dict[str, Any] = {"senders": self.senders.report(now_s), "connections": self._connections()}
+        report["listening"] = {name: receiver.address for name, receiver in self.receivers.items()}
         with self._lock:
             report["clocks"] = {
                 name: {"clock_offset_s": offset_s, "clock_uncertainty_s": uncertainty_s, "age_s": now_s - at_s}

@@ -5,10 +5,11 @@ transit time is unknown, so the offset has no uncertainty, unlike that of a ping
 """
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from manipnet.inputs.base import Sink
-from manipnet.wire.bodies import BodyFrame
+from manipnet.wire.bodies import MAX_BODIES, BodyFrame
 
 MOST = 64
 RATE_S = 1.0
@@ -32,6 +33,37 @@ class _Pace:
             self.since_s, self.since_t_s = now_s, t_s
 
 
+class _Body:
+    """How often one body of a sender arrives, and how often it is tracked, in the current period and the one before."""
+
+    __slots__ = ("counted", "heard_s", "rate_hz", "share", "since_s", "tracked")
+
+    def __init__(self, now_s: float) -> None:
+        self.since_s = self.heard_s = now_s
+        self.counted = self.tracked = 0
+        self.rate_hz, self.share = 0.0, 0.0
+
+    def turn(self, now_s: float) -> None:
+        """End a period."""
+        self.rate_hz, self.share = self._rate(now_s), self.tracked / self.counted
+        self.since_s, self.counted, self.tracked = now_s, 0, 0
+
+    def report(self, id: int | None, name: str | None, now_s: float) -> dict[str, Any]:
+        """`id`, `name`, `rate_hz`, `age_s` and the share of the frames in which it was `tracked`."""
+        is_young = not self.rate_hz
+        return {
+            "id": id,
+            "name": name,
+            "rate_hz": self._rate(self.heard_s) if is_young else self.rate_hz,
+            "age_s": max(now_s - self.heard_s, 0.0),
+            "tracked": self.tracked / self.counted if self.counted and is_young else self.share,
+        }
+
+    def _rate(self, now_s: float) -> float:
+        passed_s = now_s - self.since_s
+        return (self.counted - (not self.rate_hz)) / passed_s if passed_s > 0.0 else 0.0
+
+
 @dataclass(slots=True)
 class _Sender:
     frames: int
@@ -43,6 +75,7 @@ class _Sender:
     offset_s: float
     offset_before_s: float
     pace: _Pace
+    bodies: dict[tuple[int | None, str | None], _Body] = field(default_factory=dict)
 
 
 class SenderStats:
@@ -58,10 +91,11 @@ class SenderStats:
             self._note(frame, frame.t_received_s, frame.t_s - frame.t_received_s)
         self._sink(frame)
 
-    def report(self, now_s: float) -> dict[str, dict[str, float | int | None]]:
+    def report(self, now_s: float) -> dict[str, dict[str, Any]]:
         """For each source: frames so far, frames per second, age of the newest frame, offset of its clock from ours.
 
-        `clock_speed` is how many seconds of its clock pass in one of ours, or None in its first second.
+        `clock_speed` is how many seconds of its clock pass in one of ours, or None in its first second. `bodies` are
+        its bodies, each with its rate, its age and the share of the frames in which it is tracked.
         """
         with self._lock:
             return {
@@ -72,6 +106,7 @@ class SenderStats:
                     "clock_offset_s": max(sender.offset_s, sender.offset_before_s),
                     "clock_uncertainty_s": None,
                     "clock_speed": sender.pace.speed,
+                    "bodies": [body.report(*key, now_s) for key, body in sender.bodies.items()],
                 }
                 for source, sender in self._senders.items()
             }
@@ -79,11 +114,14 @@ class SenderStats:
     def _note(self, frame: BodyFrame, now_s: float, offset_s: float) -> None:
         sender = self._senders.pop(frame.source, None)
         if sender is None or abs(offset_s - sender.offset_s) > RESTART_S:
-            frames, pace = (0, _Pace(now_s, frame.t_s)) if sender is None else (sender.frames, sender.pace)
-            sender = _Sender(frames, now_s, now_s, 0, 0.0, now_s, offset_s, offset_s, pace)
+            if sender is None:
+                sender = _Sender(0, now_s, now_s, 0, 0.0, now_s, offset_s, offset_s, _Pace(now_s, frame.t_s))
+            else:  # its clock was set or has restarted
+                sender.clocked_s, sender.offset_s, sender.offset_before_s = now_s, offset_s, offset_s
         if len(self._senders) >= MOST:
             del self._senders[next(iter(self._senders))]  # the sender that has been silent for longest
         self._senders[frame.source] = sender
+        self._note_bodies(sender.bodies, frame, now_s)
         sender.frames += 1
         sender.heard_s = now_s
         sender.pace.note(frame.t_s, now_s)
@@ -94,3 +132,18 @@ class SenderStats:
         if now_s - sender.clocked_s >= CLOCK_S:
             sender.clocked_s, sender.offset_before_s, sender.offset_s = now_s, sender.offset_s, offset_s
         sender.offset_s = max(sender.offset_s, offset_s)
+
+    @staticmethod
+    def _note_bodies(bodies: dict[tuple[int | None, str | None], _Body], frame: BodyFrame, now_s: float) -> None:
+        for sample in frame.bodies:
+            key = sample.id, sample.name
+            body = bodies.get(key)
+            if body is None:
+                if len(bodies) >= MAX_BODIES:
+                    del bodies[min(bodies, key=lambda each: bodies[each].heard_s)]
+                body = bodies[key] = _Body(now_s)
+            elif now_s - body.since_s >= RATE_S and body.counted:
+                body.turn(now_s)
+            body.heard_s = now_s
+            body.counted += 1
+            body.tracked += sample.tracked

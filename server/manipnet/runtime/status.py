@@ -2,12 +2,13 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.live_hand import LiveHand
 from manipnet.actors.transitions import state_at_age
+from manipnet.config.settings import BodyKey
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import BodyHealth
 
@@ -59,6 +60,7 @@ def status(actors: Sequence[Actor], telemetry: Telemetry, now_s: float) -> dict[
         "actors": {actor.config.name: _actor(actor, now_s) for actor in actors},
         "delay_ms": {name: 1e3 * delay_s for name, delay_s in zip(DELAY_PERCENTILES, delays_s, strict=True)},
         "counters": telemetry.counts(),
+        "drops": telemetry.losses(),
         "receivers": {name: dict(report) for name, report in telemetry.receivers().items()},
     }
 
@@ -96,7 +98,6 @@ class SilenceWatch:
 
 def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
     names = [*actor.config.wrists, *(prop.name for prop in actor.props)]
-    never_tracked = dict.fromkeys(names, BodyHealth(math.nan, math.inf))
     return {
         "seq": actor.seq,
         "look_ahead_s": actor.look_ahead_s,
@@ -105,16 +106,25 @@ def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
             side: {"state": hand.shown.state if hand.shown else "rest", "object": hand.prop}
             for side, hand in actor.hands.items()
         },
-        "bodies": {
-            name: {
-                "state": state_at_age(health.age_s),
-                "age_s": _finite(health.age_s),
-                "rate_hz": _finite(health.rate_hz),
-            }
-            for name, health in (never_tracked | actor.health(now_s)).items()
-        },
+        "bodies": bodies_report(names, actor.body_keys(), actor.health(now_s)),
         "ticks_skipped": actor.ticks_skipped,
         "sender_restarts": actor.sender_restarts,
+    }
+
+
+def bodies_report(
+    names: Iterable[str], keys: Mapping[str, BodyKey], healths: Mapping[str, BodyHealth]
+) -> dict[str, dict[str, Any]]:
+    """For each wrist and prop: its body, its state, the age of its newest tracked sample, and its rate."""
+    never_tracked = dict.fromkeys(names, BodyHealth(math.nan, math.inf))
+    return {
+        name: {
+            "body": keys.get(name, name),
+            "state": state_at_age(health.age_s),
+            "age_s": _finite(health.age_s),
+            "rate_hz": _finite(health.rate_hz),
+        }
+        for name, health in (never_tracked | dict(healths)).items()
     }
 
 

@@ -12,6 +12,7 @@ from manipnet.config.settings import ServerConfig, check
 from manipnet.jit import seal_cache
 from manipnet.net.curve_keys import read_server_keys
 from manipnet.runtime.clock_watch import ClockWatch
+from manipnet.runtime.run_file import announce, withdraw
 from manipnet.runtime.status import SecondLines, SilenceWatch
 from manipnet.server.services import open_services
 from manipnet.server.session import Session
@@ -72,6 +73,8 @@ class Server:
             gc.collect()
             gc.freeze()
             self._say("ready " + " ".join(f"{what} {address}" for what, address in self.addresses.items()))
+            announce(self.addresses, self._keys is not None)
+            opened.callback(withdraw)
             if self._session.config.is_exposed:
                 _log.warning(
                     "--insecure: every machine that reaches %s may send bodies, receive hands and change the session; "

@@ -1,63 +1,23 @@
 """`manipnet doctor`: says why no bodies arrive. It asks the running server, or else listens in its place."""
 
 import argparse
-import errno
-import logging
-import os
 import sys
-import threading
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from manipnet.common.options import ConfigError, Option
 from manipnet.config.flags import add_flags, read_flags
 from manipnet.config.rig_reader import Rig, load_rig
-from manipnet.config.settings import (
-    WRISTS,
-    ActorConfig,
-    BodyKey,
-    ServerConfig,
-    all_options,
-    default_actor,
-    input_options,
-    server_config,
-)
+from manipnet.config.settings import all_options, default_actor, input_options, server_config
+from manipnet.control.client import ControlClient
 from manipnet.control.request import RequestError
-from manipnet.inputs import make_receivers
-from manipnet.inputs.declaration import Input
 from manipnet.net.curve_keys import KeyFileError
-from manipnet.net.errors import ListenError
-from manipnet.telemetry import Telemetry
-from manipnet.wire.bodies import BodyFrame
-from manipnet_tools.doctor import other_interfaces
-from manipnet_tools.doctor.diagnosis import Finding, SourceTraffic, Traffic, diagnose
-from manipnet_tools.doctor.from_status import of_receivers, of_server
+from manipnet.runtime.diagnosis.finding import Finding, of_map
+from manipnet.runtime.run_file import RunningServer, running_servers
+from manipnet_tools.doctor.listening import listen_and_diagnose
 
 ANSWER_S = 2.0
-MAX_SOURCES = 32
-MAX_LOG_LINES = 20
-
-
-class TrafficMonitor(logging.Handler):
-    """Collects frames, as a sink, and the receivers' log lines, as a log handler. From any thread."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self._lock = threading.Lock()
-        self.sources: dict[str, SourceTraffic] = {}
-        self.log: list[str] = []
-
-    def __call__(self, frame: BodyFrame) -> None:
-        """Take one frame."""
-        with self._lock:
-            if frame.source in self.sources or len(self.sources) < MAX_SOURCES:
-                self.sources.setdefault(frame.source, SourceTraffic()).add(frame)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Take one log line."""
-        self.log = [*self.log[1 - MAX_LOG_LINES :], record.getMessage()]
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -65,7 +25,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="manipnet doctor",
         usage="manipnet doctor [options]",
-        description="Say why no tracked bodies arrive, and what to do. Asks the server that runs on this machine; "
+        description="Say why no tracked bodies arrive, and what to do. Asks the servers that run on this machine; "
         "without one, listens where it would listen.",
     )
     parser.add_argument("--rig", type=Path, metavar="FILE", help="the rig file of the server, to compare bodies with")
@@ -90,62 +50,38 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def examine(options: argparse.Namespace) -> list[Finding]:
-    """Ask the server, or listen in its place, and diagnose. Raises `ConfigError` and `KeyFileError`."""
+    """Ask the servers that run here, or listen in their place. Raises `ConfigError` and `KeyFileError`.
+
+    If the options or the rig name a control port, the server there is meant; any other is only mentioned.
+    """
     rig = Rig((default_actor(),)) if options.rig is None else load_rig(options.rig)
-    config = server_config(rig.actors, rig.server | read_flags(options, _server_options()))
-    status = ask_status(config.host, config.control_port, options.key)
+    values = rig.server | read_flags(options, _server_options())
+    config = server_config(rig.actors, values)
+    status = ask_status(_address(config.host, config.control_port), options.key)
     if status is not None:
         return of_server(status, f"{config.host}:{config.control_port}")
-    return listen_and_diagnose(config, options.seconds)
+    others = [server for server in running_servers() if server.addresses.get("control")]
+    if others and "control_port" not in values:
+        return [finding for server in others for finding in _of_running(server, options.key)]
+    mentioned = [
+        Finding(
+            "note", f"another server runs here (process {each.pid}), with its control at {each.addresses['control']}"
+        )
+        for each in others
+    ]
+    return [*mentioned, *listen_and_diagnose(config, options.seconds)]
 
 
-def listen_and_diagnose(config: ServerConfig, seconds: float) -> list[Finding]:
-    """Start the server's receivers for some seconds, and diagnose what arrives."""
-    monitor, telemetry = TrafficMonitor(), Telemetry()
-    log = logging.getLogger("manipnet.inputs")
-    findings: list[Finding] = []
-    addresses: list[str] = []
-    receivers = make_receivers(config.of, monitor, telemetry, config.host)
-    with ExitStack() as opened:
-        log.addHandler(monitor)
-        opened.callback(log.removeHandler, monitor)
-        for receiver in receivers.values():
-            try:
-                receiver.start()
-            except ListenError as error:
-                findings.append(_cannot_listen(error))
-            else:
-                opened.callback(receiver.stop)
-                addresses.append(receiver.address)
-                findings.append(Finding("ok", f"listening for {seconds:g} s on {receiver.address}"))
-        beside = _other_interfaces(config, receivers)
-        listen(seconds)
-        findings += _wrong_addresses(config.host, beside.counts())
-        findings += of_receivers({declared.title: receiver.status() for declared, receiver in receivers.items()})
-    traffic = Traffic(monitor.sources, telemetry.counts().get("frames_dropped", {}), monitor.log)
-    return findings + diagnose(traffic, expected_parts(config.actors), addresses)
+def of_server(status: Mapping[str, Any], where: str) -> list[Finding]:
+    """The server's own findings, from its answer to the request `status`."""
+    begin = Finding("ok", f"a server runs here (control {where}); it reports:")
+    arrived = ", ".join(f"{count} by {name}" for name, count in status["counters"].get("frames_in", {}).items())
+    counted = [Finding("ok", f"frames that arrived: {arrived}")] if arrived else []
+    return [begin, *counted, *map(of_map, status.get("doctor", ()))]
 
 
-def listen(seconds: float) -> None:
-    """Let the receivers work."""
-    threading.Event().wait(seconds)
-
-
-def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
-    """The body of each wrist and prop of the actors."""
-    parts: dict[str, BodyKey] = {}
-    for actor in actors:
-        prefix = f"{actor.name}: " if len(actors) > 1 else ""
-        parts |= {prefix + wrist: actor.wrists[wrist].key for wrist in WRISTS if wrist in actor.wrists}
-        parts |= {prefix + thing.name: thing.body.key for thing in actor.objects}
-    return parts
-
-
-def ask_status(host: str, port: int, key: Path | None = None) -> dict[str, Any] | None:
-    """The `status` of the server that runs there, or None if none answers. Raises `KeyFileError`."""
-    from manipnet.control.client import ControlClient  # loads ZeroMQ, for which a wrong option does not wait
-
-    address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+def ask_status(address: str, key: Path | None = None) -> dict[str, Any] | None:
+    """The `status` of the server at that control address, or None if none answers. Raises `KeyFileError`."""
     try:
         answer = ControlClient(address, key, ANSWER_S).ask("status")
     except (OSError, RequestError):
@@ -153,42 +89,25 @@ def ask_status(host: str, port: int, key: Path | None = None) -> dict[str, Any] 
     return answer if "counters" in answer else None
 
 
+def _of_running(server: RunningServer, key: Path | None) -> list[Finding]:
+    """The findings of a server that has announced itself."""
+    control = server.addresses["control"].removeprefix("tcp://")
+    status = ask_status(control.replace("0.0.0.0", "127.0.0.1"), key)
+    if status is not None:
+        return of_server(status, control)
+    text = f"a server runs here (process {server.pid}, control {control}), but does not answer"
+    if server.has_keys:
+        return [Finding("problem", f"{text} to strangers, since it was started with --keys", "give --key NAME.toml")]
+    return [Finding("problem", text, "it is starting, busy or stuck: see its terminal and its log")]
+
+
+def _address(host: str, port: int) -> str:
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
 def _server_options() -> list[Option]:
     options = all_options()
-    return [options["host"], options["control_port"], *input_options()]
-
-
-def _other_interfaces(config: ServerConfig, receivers: Mapping[Input, Any]) -> other_interfaces.OtherInterfaces:
-    everywhere = config.host in ("0.0.0.0", "::")
-    addresses = set() if everywhere else other_interfaces.own_addresses() - {config.host}
-    ports: list[other_interfaces.Port] = [
-        (declared.transport, getattr(config.of(declared.options), declared.where.field))
-        for declared in receivers
-        if declared.transport is not None
-    ]
-    return other_interfaces.OtherInterfaces(sorted(addresses), ports)
-
-
-def _cannot_listen(error: ListenError) -> Finding:
-    text = str(error)
-    if os.strerror(errno.EADDRINUSE) in text:
-        remedy = "see which program has the port: `ss -lntup`, on Windows `netstat -ano`"
-    elif os.strerror(errno.EADDRNOTAVAIL) in text:
-        remedy = f"name an address of this machine: {', '.join(sorted(other_interfaces.own_addresses()))}"
-    else:
-        remedy = "correct the address or the port"
-    return Finding("problem", text, remedy)
-
-
-def _wrong_addresses(host: str, counts: Mapping[str, int]) -> list[Finding]:
-    return [
-        Finding(
-            "problem",
-            f"{count} packets or connections came to {where}, but the server listens on {host}",
-            f"send to {host}, or start the server with --host {where.rpartition(':')[0]} (and --keys and --allow)",
-        )
-        for where, count in counts.items()
-    ]
+    return [options["host"], options["control_port"], options["allow"], *input_options()]
 
 
 if __name__ == "__main__":

@@ -1,0 +1,81 @@
+"""Findings about each wrist and prop of the rig: whether its body arrives, is tracked, and is used."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from manipnet.runtime.diagnosis.finding import Finding, Report, ago, label, listed
+from manipnet.runtime.diagnosis.senders import SILENT_S
+
+_WHY: Final = ("time_jump", "late", "duplicate", "other_sender", "conflict", "frozen", "jump", "swap", "zeros", "nan")
+
+
+def of_parts(report: Report) -> list[Finding]:
+    """What arrives for each part of each actor, and what arrives for nobody."""
+    actors = report.get("actors", {})
+    findings: list[Finding] = []
+    used: set[str] = set()
+    for actor, about in actors.items():
+        for role, health in about.get("bodies", {}).items():
+            part = f"{actor}: {role}" if len(actors) > 1 else role
+            used.add(str(health["body"]))
+            findings.append(_of_part(part, health, report))
+    return findings + list(_unused(report, used))
+
+
+def _of_part(part: str, health: Mapping[str, Any], report: Report) -> Finding:
+    key = health["body"]
+    arriving = {source: body for source, body in _bodies(report) if str(key) in (str(body["id"]), str(body["name"]))}
+    fresh = {source: body for source, body in arriving.items() if body["age_s"] <= SILENT_S}
+    if not fresh:
+        return _missing(part, key, arriving, report)
+    if len(fresh) > 1:
+        remedy = "stop all senders of this body but one; the server uses only one of them"
+        return Finding("problem", f"{part}: body {key!r} comes from {len(fresh)} senders: {', '.join(fresh)}", remedy)
+    ((source, body),) = fresh.items()
+    share = body["tracked"]
+    if not share:
+        remedy = "it is occluded, outside of the volume or switched off: check its state in the tracking software"
+        return Finding("problem", f"{part}: body {key!r} arrives but is never tracked ({source})", remedy)
+    text = (
+        f"{part}: body {key!r} is tracked in {100 * share:.0f} % of {body['rate_hz']:.0f} frames per second from "
+        f"{source}, the newest {ago(body['age_s'])}"
+    )
+    if health["state"] == "live":
+        return Finding("ok" if share > 0.9 else "note", text)
+    remedy = "see the lines about what is dropped or rejected"
+    return Finding("problem", f"{text}, but is not used{_why(report)}", remedy)
+
+
+def _missing(part: str, key: object, arrived: Mapping[str, Mapping[str, Any]], report: Report) -> Finding:
+    if arrived:
+        source, body = min(arrived.items(), key=lambda item: item[1]["age_s"])
+        remedy = "it is switched off or no longer streamed, or its sender has stopped"
+        return Finding("problem", f"{part}: body {key!r} last arrived {ago(body['age_s'])} from {source}", remedy)
+    others = sorted({label(body) for _, body in _bodies(report)})
+    remedy = "give the body that name in the tracking software, or name one of these in the rig: " + listed(others)
+    if not others:
+        remedy = "see the lines about what arrives; no body does"
+    return Finding("problem", f"{part}: no body {key!r} arrives", remedy)
+
+
+def _unused(report: Report, used: set[str]) -> Iterator[Finding]:
+    others = [label(body) for _, body in _bodies(report) if not used & {str(body["id"]), str(body["name"])}]
+    if others and used:
+        yield Finding("note", f"these bodies arrive but are not in the rig: {listed(sorted(set(others)))}")
+
+
+def _bodies(report: Report) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for source, sender in report.get("senders", {}).items():
+        for body in sender["bodies"]:
+            yield source, body
+
+
+def _why(report: Report) -> str:
+    drops = report.get("drops", {})
+    recent = {
+        reason: drop["rate_hz"]
+        for counter in ("frames_dropped", "bodies_rejected")
+        for reason, drop in drops.get(counter, {}).items()
+        if reason in _WHY and drop["age_s"] <= SILENT_S
+    }
+    return f" (most is lost as {max(recent, key=lambda reason: recent[reason])})" if recent else ""
