@@ -14,7 +14,7 @@ from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.results import CAPTURED, HOLD, MEAN, NEAREST, Fold
-from manipnet_tools.evaluation.roll_outs import evaluate, folds
+from manipnet_tools.evaluation.roll_outs import baseline_rows, evaluate, folds, model_rows
 from manipnet_tools.evaluation.sweeps import noise, scale
 
 HAND = shipped_hand()
@@ -24,7 +24,8 @@ HAND = shipped_hand()
 def results(cases, still_model):
     fold = Fold("seen", [cases["cyl_med3"].part(0.2, 0.5)], [cases["mug1"].part(0.4, 0.5)])
     bundle = load_bundle(still_model)
-    return evaluate([fold], "seen", {"still": lambda fold: bundle}, ["none"], Progress(disable=True))
+    sources = baseline_rows(lambda fold: bundle) | model_rows({"still": lambda fold: bundle}, ["none"])
+    return evaluate([fold], "seen", sources, Progress(disable=True))
 
 
 def test_every_row_covers_every_case(results):

@@ -12,6 +12,10 @@ EvaluationProtocol = Literal["seen", "unseen"]
 PROTOCOLS: Final[tuple[EvaluationProtocol, ...]] = ("seen", "unseen")
 Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
 
+Measures = Literal["scores", "drop"]
+"""scores: joint error, contact, penetration, smoothness and physics. drop: the drop test, which needs mujoco."""
+MEASURES: Final[tuple[Measures, ...]] = ("scores", "drop")
+
 ABLATION_TRAINING: Final = TrainConfig(
     architecture="manipnet", rounds=1, epochs_per_round=6, on_policy=0.0, huber=0.0, weight_average=0.99, response=0.4
 )
@@ -35,6 +39,10 @@ class EvaluateOptions:
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""
+    only: tuple[Measures, ...] = MEASURES
+    """Measure only these. "drop" needs the extra `judge`."""
+    fingers: tuple[str, ...] = ()
+    """Judge files of `manipnet synthesize` (TAKE=FILE.npz) instead of models. Only the takes named here are tested."""
     sweep: Sweep | None = None
     """Evaluate instead how the last 20 % of each take changes with noise, a shorter look-ahead, other meshes, objects
     of other sizes, or over ten minutes."""

@@ -29,6 +29,9 @@ MEASURES = {
     "idle_ratio": ("idle ratio", "{:.2f}", 1.0),
     "physics": ("physics, %", "{:.1f}", 100.0),
     "physics_paper": ("paper's physics, %", "{:.1f}", 100.0),
+    "drop_right": ("drop test, right alone, %", "{:.0f}", 100.0),
+    "drop_left": ("drop test, left alone, %", "{:.0f}", 100.0),
+    "drop_both": ("drop test, both hands, %", "{:.0f}", 100.0),
 }
 """The label, format and factor of each measure."""
 MAX_COLUMNS = 8
@@ -45,7 +48,8 @@ def tables(results: Results, ours: str) -> Iterator[Table]:
 
 
 def table_of(title: str, scores: dict[str, Score]) -> Table:
-    """A table with a column per score, of which every n-th is shown if there are many, and a line per measure."""
+    """A table with a column per score, of which every n-th is shown if there are many, and a line per measure that any
+    of them has."""
     names = list(scores)
     names = names[:: -(-len(names) // MAX_COLUMNS)]
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 0, 0, 1), pad_edge=False)
@@ -53,7 +57,9 @@ def table_of(title: str, scores: dict[str, Score]) -> Table:
     for name in names:
         table.add_column(name, justify="right")
     for measure, (label, form, factor) in MEASURES.items():
-        table.add_row(label, *(_cell(getattr(scores[name], measure), form, factor) for name in names))
+        values = [getattr(scores[name], measure) for name in names]
+        if any(map(math.isfinite, values)):
+            table.add_row(label, *(_cell(value, form, factor) for value in values))
     return table
 
 
@@ -83,6 +89,7 @@ def verdicts(results: Results, ours: str) -> list[dict[str, Any]]:
             "met": target.met(score, captured),
         }
         for target in TARGETS[results.protocol]
+        if math.isfinite(getattr(score, target.measure))
     ]
 
 

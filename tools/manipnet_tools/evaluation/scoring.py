@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from math import nan
 
 import numpy as np
 
@@ -12,28 +13,31 @@ from manipnet_tools.evaluation.cases import Case
 
 @dataclass(frozen=True)
 class Score:
-    """Measures of one hand on one case; nan if the case has no such frames.
+    """Measures of one hand on one case; nan if the case has no such frames, or if the measure was not asked for.
 
     `ratio` is the joint error relative to the mean training pose's, on frames near the object; `near_mm` is that error.
-    `smoothness_ratio` and `idle_ratio` are relative to the captured fingers on the same frames. The two physics shares
-    count both hands together.
+    `smoothness_ratio` and `idle_ratio` are relative to the captured fingers on the same frames. The physics
+    and drop shares belong to the take, so both hands have the same.
     """
 
-    ratio: float
-    near_mm: float
-    mpjpe_mm: float
-    tip_mm: float
-    drift_s: float
-    contact_f1: float
-    penetration_cm: float
-    over_1cm: float
-    deep: float
-    slide_mm_s: float
-    smoothness: float
-    smoothness_ratio: float
-    idle_ratio: float
-    physics: float
-    physics_paper: float
+    ratio: float = nan
+    near_mm: float = nan
+    mpjpe_mm: float = nan
+    tip_mm: float = nan
+    drift_s: float = nan
+    contact_f1: float = nan
+    penetration_cm: float = nan
+    over_1cm: float = nan
+    deep: float = nan
+    slide_mm_s: float = nan
+    smoothness: float = nan
+    smoothness_ratio: float = nan
+    idle_ratio: float = nan
+    physics: float = nan
+    physics_paper: float = nan
+    drop_right: float = nan
+    drop_left: float = nan
+    drop_both: float = nan
 
 
 def score(case: Case, mean_pose: Array, hands: dict[Side, Array]) -> dict[Side, Score]:
