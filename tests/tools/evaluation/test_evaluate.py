@@ -53,10 +53,10 @@ def test_a_model_that_never_moves_misses_its_targets(results):
 
 
 def test_the_report_is_json_and_tables(results):
-    content = json.loads(json.dumps(report.as_json(results, "still, no IK"), allow_nan=False))
+    content = json.loads(json.dumps(report.as_json(results, "still, no IK", {}), allow_nan=False))
     assert content["rows"][CAPTURED]["takes"]["mug1"]["left"]["contact_f1"] == 1.0
     console = Console(width=100, record=True, file=StringIO())
-    for table in report.tables(results, "still, no IK"):
+    for table in report.tables(results, "still, no IK", {}):
         console.print(table)
     text = console.export_text()
     assert "error ratio, near" in text

@@ -56,9 +56,9 @@ def run(options: AblateOptions) -> None:
         with Progress(console=console) as progress:
             sources = model_rows(models, ("least_squares", "none")) | baseline_rows(models["ours"])
             results = evaluate(tests, protocol, sources, progress)
-        for table in report.tables(results, "ours, least squares"):
+        for table in report.tables(results, "ours, least squares", {}):
             console.print(table)
-        content = report.as_json(results, "ours, least squares")
+        content = report.as_json(results, "ours, least squares", {})
         (options.out / f"{protocol}.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 

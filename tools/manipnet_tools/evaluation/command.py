@@ -14,6 +14,7 @@ from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import load_cases
 from manipnet_tools.evaluation.finger_files import finger_files, fingers_of
 from manipnet_tools.evaluation.options import EvaluateOptions, Sweep
+from manipnet_tools.evaluation.realism import realism
 from manipnet_tools.evaluation.results import FINGERS, Fold, row_name
 from manipnet_tools.evaluation.roll_outs import Source, baseline_rows, evaluate, folds, model_rows
 from manipnet_tools.takes.dataset import take_folders
@@ -53,7 +54,13 @@ def _protocol(options: EvaluateOptions, progress: Progress) -> tuple[dict[str, A
 
         for path in progress.track(list(plots.write_all(results, ours, options.plots)), description="plots"):
             progress.console.print(f"wrote {path}")
-    return report.as_json(results, ours), list(report.tables(results, ours))
+    if options.sheet:
+        from manipnet_tools.evaluation.sheet import write_sheet
+
+        answers = write_sheet(results, ours, options.sheet)
+        progress.console.print(f"wrote {options.sheet}; {answers} says which pictures are captured")
+    compared = realism(results) if "realism" in options.only else {}
+    return report.as_json(results, ours, compared), list(report.tables(results, ours, compared))
 
 
 def _model_sources(options: EvaluateOptions) -> dict[str, Source]:

@@ -12,9 +12,10 @@ EvaluationProtocol = Literal["seen", "unseen"]
 PROTOCOLS: Final[tuple[EvaluationProtocol, ...]] = ("seen", "unseen")
 Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
 
-Measures = Literal["scores", "drop"]
-"""scores: joint error, contact, penetration, smoothness and physics. drop: the drop test, which needs mujoco."""
-MEASURES: Final[tuple[Measures, ...]] = ("scores", "drop")
+Measures = Literal["scores", "drop", "realism"]
+"""scores: joint error, contacts, penetration, motion and physics. drop: the drop test. realism: whether a classifier
+can tell the motion from captured motion."""
+MEASURES: Final[tuple[Measures, ...]] = ("scores", "drop", "realism")
 
 ABLATION_TRAINING: Final = TrainConfig(
     architecture="manipnet", rounds=1, epochs_per_round=6, on_policy=0.0, huber=0.0, weight_average=0.99, response=0.4
@@ -40,7 +41,7 @@ class EvaluateOptions:
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""
     only: tuple[Measures, ...] = MEASURES
-    """Measure only these. "drop" needs the extra `judge`."""
+    """Measure only these; drop needs the extra `judge`."""
     fingers: tuple[str, ...] = ()
     """Judge files of `manipnet synthesize` (TAKE=FILE.npz) instead of models. Only the takes named here are tested."""
     sweep: Sweep | None = None
@@ -48,6 +49,9 @@ class EvaluateOptions:
     of other sizes, or over ten minutes."""
     json: Path | None = None
     """Write every figure to this file."""
+    sheet: Path | None = None
+    """Draw captured and synthesised grasps in random order into this PNG, and write which is which into a text file
+    beside it. The first model is drawn."""
     plots: Path | None = None
     """Write plots and pictures of the worst frames into this folder."""
 
