@@ -13,7 +13,7 @@ from manipnet.common.text_output import accept_any_text
 @dataclass(frozen=True)
 class Verb:
     """A verb and the module that does it: `module.run(options)` if there is a class of options, else
-    `module.main(argv)`."""
+    `module.main(argv)`. Options are checked before the module, and so its libraries, are imported."""
 
     summary: str
     module: str
@@ -113,8 +113,8 @@ VERBS = {
     ),
     "bench": Verb(
         "measure how long each stage of a tick takes",
-        "manipnet_tools.bench",
-        None,
+        "manipnet_tools.bench.command",
+        "manipnet_tools.bench.options.BenchOptions",
         ("--only tick --seconds 20", "--json figures.json"),
     ),
     "doctor": Verb(
@@ -209,6 +209,7 @@ def _run(name: str, verb: Verb, rest: list[str]) -> int:
         if verb.options is None:
             return importlib.import_module(verb.module).main(rest) or 0
         options = _parsed(name, verb.options, rest)
+        options.check()
     except SystemExit as end:
         if not end.code and verb.examples:
             print("\nexamples:", *(f"  manipnet {name} {example}" for example in verb.examples), sep="\n")

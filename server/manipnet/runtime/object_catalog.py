@@ -4,7 +4,7 @@ import logging
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -16,7 +16,9 @@ from manipnet.synthesis.objects.shape import Shape
 
 MAX_FOLDER_FILES: Final = 1000
 MAX_UNUSED: Final = 16
-"""Shapes that are kept although nobody may carry them: those that were asked for last."""
+"""Shapes that are kept although nobody may carry them: those that were requested last."""
+MAX_UNUSED_TRIANGLES: Final = 600_000
+"""Triangles of these shapes together, which take about 270 MB; the newest is kept whatever its size."""
 _log = logging.getLogger(__name__)
 
 
@@ -32,8 +34,8 @@ class Source:
 class ObjectCatalog:
     """Shapes of the rig, of the user's `folder` and of the library. Thread-safe.
 
-    A shape is built on the thread that first asks for it. It is kept while it is in use, and while it is among the
-    `MAX_UNUSED` that were asked for last. An object that a client has added is forgotten with its shape.
+    A shape is built on the thread that first requests it. It is kept while it is in use, and while it is among the
+    `MAX_UNUSED` that were requested last. An object that a client has added is forgotten with its shape.
 
     If two objects have the same name, the rig's comes before the folder's, and the folder's before the library's.
     """
@@ -48,7 +50,7 @@ class ObjectCatalog:
         self._sources: dict[str, Source] = {}
         self._of_rig: set[Source] = set()
         self._shapes: weakref.WeakValueDictionary[Source, Shape] = weakref.WeakValueDictionary()
-        self._newest = deque[Shape](maxlen=MAX_UNUSED)
+        self._newest: deque[Shape] = deque()
         self._stamps: dict[Source, tuple[int, int]] = {}
         self._unsettled: dict[Source, tuple[int, int]] = {}
         self._problems: dict[Source, str] = {}
@@ -162,10 +164,12 @@ class ObjectCatalog:
         return shape
 
     def _keep(self, shape: Shape) -> None:
-        """Note that a shape was asked for; the one for which nobody has asked for longest may go instead."""
+        """Note that a shape was requested; those that were requested longest ago may go instead."""
         if shape in self._newest:
             self._newest.remove(shape)
         self._newest.append(shape)
+        while len(self._newest) > MAX_UNUSED or len(self._newest) > 1 < _triangles(self._newest) / MAX_UNUSED_TRIANGLES:
+            self._newest.popleft()
 
     def _forget_unused(self) -> None:
         """Forget the added objects whose shapes are gone, and what is known of their files."""
@@ -174,6 +178,10 @@ class ObjectCatalog:
         for notes in (self._stamps, self._unsettled, self._problems):
             for source in [source for source in notes if source not in known]:
                 del notes[source]
+
+
+def _triangles(shapes: Iterable[Shape]) -> int:
+    return sum(len(shape.mesh.faces) for shape in shapes)
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:

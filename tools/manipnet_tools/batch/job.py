@@ -1,4 +1,4 @@
-"""One take of a batch: what its result depends on, and how it is made, on this machine or another."""
+"""One take of a batch: what its result depends on, and how it is synthesised, on this machine or another."""
 
 import hashlib
 import json
@@ -24,10 +24,10 @@ Advance = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A take to synthesise, and with what."""
+    """A take to synthesise, with the meshes, the model and the settings to use."""
 
     name: str
-    """The take's name within the batch, after which the result is named."""
+    """The name of the take within the batch, which is also that of its result."""
     take: Path
     meshes: Mapping[str, Path]
     """Mesh files by object, which may include objects that are not in this take."""
@@ -37,11 +37,11 @@ class Job:
     rig: RigText | None
     """The rig file, for a take that does not say which body is which."""
     out: Path
-    """The file to write, .npz. A .json file of the same name says what the result was made from."""
+    """The file to write, .npz. A .json file of the same name holds a hash of everything the result depends on."""
 
     @property
     def note(self) -> Path:
-        """The file that says what the result was made from."""
+        """The .json file beside the result."""
         return self.out.with_name(f"{self.out.stem}.json")
 
 
@@ -69,7 +69,7 @@ class Prepared:
 
 
 def do(job: Job, advance: Advance = lambda done, total: None) -> Outcome:
-    """Synthesise one take unless its result is up to date. An error in a take gives a failed outcome, no exception."""
+    """Synthesise one take unless its result is up to date. An error becomes a failed outcome."""
     start_s = time.monotonic()
     try:
         prepared = prepare(job)
@@ -119,12 +119,6 @@ def finished(prepared: Prepared) -> Outcome | None:
     return None
 
 
-def keep(path: Path, content: bytes) -> None:
-    """Write a file so that no reader ever sees a part of it. Raises `OSError`."""
-    with replacing(path) as file:
-        file.write(content)
-
-
 def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
     job, take = prepared.job, prepared.rigged.take
     shapes = read_shapes([f"{name}={file}" for name, file in prepared.meshes.items()], take, job.take, job.rig)
@@ -138,12 +132,11 @@ def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
 
     advance(0, total)
     hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count, prepared.rigged.hand_scale)
-    part = job.out.with_name(f"{job.out.name}.part")
-    with part.open("wb") as file:
+    with replacing(job.out) as file:
         write_arrays(file, ticks, shapes, hands)
-    part.replace(job.out)
     outcome = Outcome(job.name, "done", len(ticks.time_s), time.monotonic() - start_s)
-    keep(job.note, json.dumps(asdict(outcome) | {"key": prepared.key}, indent=2).encode())
+    with replacing(job.note) as file:
+        file.write(json.dumps(asdict(outcome) | {"key": prepared.key}, indent=2).encode())
     return outcome
 
 

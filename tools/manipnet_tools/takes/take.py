@@ -100,7 +100,7 @@ def conventional(name: str) -> str:
 
 
 def _read_recording(path: Path) -> Take:
-    """The longest run of a recording's body frames, a run ending where its sender's time began anew."""
+    """The longest run of a recording's body frames, which ends where its sender restarted."""
     runs: list[dict[float, BodyFrame]] = []
     newest_s = np.inf
     for frame in read_bodies(path):

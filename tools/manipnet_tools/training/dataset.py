@@ -1,4 +1,4 @@
-"""Captured hands, and training samples made from them by the live server's own features.
+"""Captured hands, and training samples that the live server's own features make from them.
 
 A sample of tick `k` is what the server would see there (trajectories, and sensors at the pose of tick `k - 1`) and the
 pose that the network should answer with. Hands keep the 120 Hz of the capture, so that every second frame, counted from
@@ -29,11 +29,11 @@ _WINDOW_FRAMES = round(WINDOW_STEP_S * CAPTURE_HZ) * np.arange(-10, 11)
 
 @dataclass(frozen=True, eq=False)
 class CapturedHand:
-    """One hand of a take as the network sees it: at 120 Hz, a left hand mirrored into a right one."""
+    """One hand of a take as the network sees it, at 120 Hz. A left hand is mirrored into a right one."""
 
     name: str
     hand: Hand
-    """The subject's."""
+    """The hand of the captured subject."""
     shape: Shape
     mirrored: bool
     wrist: Array
@@ -43,7 +43,7 @@ class CapturedHand:
     object: Array
     """`(T, 7)`"""
     angles: Array
-    """`(T, A)` captured fingers."""
+    """`(T, A)` captured joint angles."""
 
     def __len__(self) -> int:
         return len(self.wrist)
@@ -54,7 +54,7 @@ class CapturedHand:
         return replace(self, **flipped)
 
     def windows(self, frames: np.ndarray, speed: Array | None = None) -> Windows:
-        """Windows about `frames (N,)`; the first and last frame of the take stand still beyond it.
+        """Windows around `frames (N,)`. Beyond the ends of the take, the motion stands still.
 
         `speed (N,)` plays time faster or slower.
         """
@@ -149,9 +149,9 @@ def concatenate(parts: Sequence[Samples]) -> Samples:
 def samples_at(
     captured: CapturedHand, frames: np.ndarray, before: Array, after: Array, windows: Windows | None = None
 ) -> Samples:
-    """Samples of ticks at `frames (N,)`: the server sees the pose `before (N, A)`, and `after (N, A)` is the answer.
+    """Samples of ticks at `frames (N,)`: the network sees the pose `before (N, A)`, and `after (N, A)` is the answer.
 
-    `windows` are the trajectories about the frames, by default those at the speed of the capture.
+    `windows` are the trajectories around the frames, by default at the speed of the capture.
     """
     windows = captured.windows(frames) if windows is None else windows
     hand, shape = captured.hand, captured.shape

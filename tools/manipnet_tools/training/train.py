@@ -1,4 +1,4 @@
-"""`manipnet train`: from captured takes to a bundle."""
+"""`manipnet train`: trains a model on captured takes, and writes a bundle."""
 
 import logging
 import time
@@ -10,7 +10,6 @@ import torch
 
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.layout import layout_of
-from manipnet_tools.takes.dataset import DataError, take_folders
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, Samples, load_captured_hands
 from manipnet_tools.training.model import ManipNet, normalisation
@@ -22,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class Trainer:
-    """One model in training: it learns round by round, at a falling rate."""
+    """Trains one model, round by round, at a falling learning rate."""
 
     def __init__(self, hand: Hand, first: Samples, config: TrainConfig) -> None:
         """The normalisation is taken from the `first` samples."""
@@ -42,7 +41,7 @@ class Trainer:
 
     @property
     def model(self) -> ManipNet:
-        """The model that would be shipped now."""
+        """The model as it would be shipped now."""
         return cast(ManipNet, self._average.module) if self._config.weight_average else self._last
 
     def learn(self, samples: Samples) -> float:
@@ -78,8 +77,8 @@ class Trainer:
 def train(hands: Sequence[CapturedHand], config: TrainConfig, share: float = 1.0) -> Trained:
     """Train on the first `share` of each take.
 
-    The result is the same for the same seed. It takes one thread, because with the small batches that train best a
-    second thread waits more than it works.
+    The same seed gives the same result. Training uses one thread, because with the small batches that train best, a
+    second thread mostly waits.
     """
     started = time.monotonic()
     torch.set_num_threads(1)
@@ -105,7 +104,7 @@ def trained(
     share: float,
     seconds: float,
 ) -> Trained:
-    """The model as it is now, with what a bundle needs besides."""
+    """The model as it is now, with everything else that a bundle needs."""
     takes = tuple(sorted({captured.name.split("/")[0] for captured in hands}))
     model, rest_angles, limits = trainer.model.eval(), sampler.rest_angles, sampler.limits
     return Trained(model, sampler.hand, rest_angles, limits, config, takes, share, seconds)
@@ -113,7 +112,5 @@ def trained(
 
 def run(options: TrainOptions) -> None:
     """Train and write the bundle. Raises `DataError`, `TakeError` and `MeshError`."""
-    names = [folder.name for folder in take_folders(options.data) if folder.name not in options.leave_out]
-    if not names:
-        raise DataError(f"--leave-out names every take of {options.data}; leave some to train on")
-    save_bundle(train(load_captured_hands(options.data, names), options.training, options.share), options.out)
+    hands = load_captured_hands(options.data, options.takes())
+    save_bundle(train(hands, options.training, options.share), options.out)
