@@ -15,7 +15,6 @@ from manipnet.wire.hands import (
     HandsMessage,
     Latency,
 )
-
 from manipnet.wire.timecode import MAX_RATE, is_rate, is_timecode
 
 
