@@ -15,6 +15,7 @@ from manipnet.wire.hands import (
     HandsMessage,
     Latency,
 )
+
 from manipnet.wire.timecode import MAX_RATE, is_rate, is_timecode
 
 
