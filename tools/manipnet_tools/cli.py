@@ -89,6 +89,8 @@ VERBS = {
         (
             "--data DATASET                                    the shipped model on the last 20 % of every take",
             "--data DATASET --model models/mine --json figures.json",
+            "--data DATASET --only drop --takes mug1           only the drop test, on one take",
+            "--data DATASET --only drop --protocol unseen --fingers mug1=mug1.npz      what synthesize wrote",
         ),
     ),
     "import": Verb(
@@ -163,7 +165,7 @@ EXAMPLES = """examples:
   manipnet train --data DATASET --out models/mine
   manipnet doctor --rig stage.toml"""
 
-EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster"}
+EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster", "mujoco": "judge"}
 """Libraries that a plain installation lacks, and the extra that installs each."""
 
 

@@ -16,6 +16,11 @@ EvaluationProtocol = Literal["seen", "unseen"]
 PROTOCOLS: Final[tuple[EvaluationProtocol, ...]] = ("seen", "unseen")
 Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
 
+Measures = Literal["scores", "drop", "realism"]
+"""scores: joint error, contacts, penetration, motion and physics. drop: the drop test. realism: whether a classifier
+can tell the motion from captured motion."""
+MEASURES: Final[tuple[Measures, ...]] = ("scores", "drop", "realism")
+
 ABLATION_TRAINING: Final = TrainConfig(
     architecture="manipnet", rounds=1, epochs_per_round=6, on_policy=0.0, huber=0.0, weight_average=0.99, response=0.4
 )
@@ -39,11 +44,18 @@ class EvaluateOptions:
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""
+    only: tuple[Measures, ...] = MEASURES
+    """Measure only these; drop needs the extra `judge`."""
+    fingers: tuple[str, ...] = ()
+    """Judge files of `manipnet synthesize` (TAKE=FILE.npz) instead of models. Only the takes named here are tested."""
     sweep: Sweep | None = None
     """Evaluate instead how the last 20 % of each take changes with noise, a shorter look-ahead, other meshes, objects
     of other sizes, or over ten minutes."""
     json: Path | None = None
     """Write every figure to this file."""
+    sheet: Path | None = None
+    """Draw captured and synthesised grasps in random order into this PNG, and write which is which into a text file
+    beside it. The first model is drawn."""
     plots: Path | None = None
     """Write plots and pictures of the worst frames into this folder."""
 

@@ -25,7 +25,7 @@ from manipnet.synthesis.objects.shape import Solid
 
 FEEDBACK_SHARE = 0.5
 """Share of its corrections that the network sees of its own hand: with all of them it strays from the poses it has
-learned, with none it does not know what it holds (docs/results.md, Ideas tried)."""
+learned, with none it does not know what it holds (docs/tried.md)."""
 
 _axes, _angles = stack_array(MAX_ANGLES, 3), stack_array(MAX_ANGLES)
 _correct: Callable[..., Any] = correct_nothing
