@@ -21,6 +21,7 @@ from manipnet.geometry import (
 )
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.ik.grip import grip_size
 from manipnet.synthesis.ik.pose import Poses, allocate_poses, pose_kernel
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle
@@ -62,6 +63,8 @@ class HandState:
     """`(B, 3, 3)`."""
     correction: Array
     """`(A,)` what inverse kinematics added to the network's angles, radians."""
+    grip: Array
+    """`(G,)` what the hand remembers of its grip (`ik.grip`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,7 @@ class HandStep:
 
 def state_of(hand: Hand, angles: Array) -> HandState:
     """The state of a hand posed by `angles (A,)`."""
-    return HandState(angles, *forward_kinematics(hand, angles), np.zeros(len(angles)))
+    return HandState(angles, *forward_kinematics(hand, angles), np.zeros(len(angles)), np.zeros(grip_size(len(hand.fingers), len(angles))))
 
 
 def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations: Array) -> tuple[Array, Array]:
@@ -166,7 +169,7 @@ class Synthesizer:
         order = sorted(range(count), key=lambda index: id(scenes[index].shape))
         for n, index in enumerate(order):
             batch.put(n, scenes[index], states[index])
-            poses.correction[n] = states[index].correction
+            poses.correction[n], poses.grip[n] = states[index].correction, states[index].grip
         groups = _groups([scenes[index].shape for index in order])
         for shape, first, last in groups:
             sense(
@@ -225,5 +228,5 @@ def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
-    for angles, positions, rotations, correction, distances, raw, feedback, at, turned in zip(*poses, strict=True):
-        yield HandStep(HandState(feedback, at, turned, correction), angles, positions, rotations, distances, raw)
+    for angles, positions, rotations, correction, distances, raw, feedback, at, turned, grip, _ in zip(*poses, strict=True):
+        yield HandStep(HandState(feedback, at, turned, correction, grip), angles, positions, rotations, distances, raw)

@@ -7,7 +7,7 @@ and take microseconds. Capsules meet the distance field, not the triangles: it i
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.jit import inner, stack_array
+from manipnet.jit import inner, stack_array, vector
 from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_FINGERS, MAX_JOINTS, Chains, Skeleton
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.ik.chains import Surface, angle_moves, capsule_sample, clamp
@@ -20,6 +20,8 @@ SAMPLES = 4
 """Points along a capsule's axis that are kept a radius away from the surface."""
 TARGET_WEIGHT = 1.0
 SURFACE_WEIGHT = 6.0
+GRIP_WEIGHT_M2 = 4e-3
+ANCHOR_WEIGHT = 4.0
 STAY_WEIGHT_M2 = 4e-5
 """Pull toward the network's angles, in square metres per square radian."""
 ALLOWED_DEPTH_M = 0.002
@@ -54,11 +56,13 @@ def _add_targets(
     positions: Array,
     axes: Array,
     targets: Array,
+    weight: float,
     normal: Array,
     slope: Array,
 ):
     """Add the finger's joints, pulled to their `targets (J, 3)`, to its normal equations."""
     columns = _columns()
+    weight *= TARGET_WEIGHT
     for joint in range(CHAIN_LENGTH):
         j = chains.joints[finger, joint]
         if j < 0:
@@ -78,10 +82,54 @@ def _add_targets(
                 columns[k, 0], columns[k, 1], columns[k, 2] = x, y, z
         for a in range(CHAIN_LENGTH):
             for i in range(3):
-                slope[a] += TARGET_WEIGHT * columns[a, i] * (targets[j, i] - positions[j, i])
+                slope[a] += weight * columns[a, i] * (targets[j, i] - positions[j, i])
             for b in range(a + 1):
                 for i in range(3):
-                    normal[a, b] += TARGET_WEIGHT * columns[a, i] * columns[b, i]
+                    normal[a, b] += weight * columns[a, i] * columns[b, i]
+
+
+@inner
+def _add_anchor(
+    skeleton: Skeleton,
+    chains: Chains,
+    finger: int,
+    positions: Array,
+    axes: Array,
+    anchor: Array,
+    surface: Surface,
+    normal: Array,
+    slope: Array,
+):
+    """Add the fingertip, held at its place on the object, to the finger's normal equations."""
+    columns, apart, tip = _columns(), vector(), -1
+    for k in range(CHAIN_LENGTH):
+        if chains.joints[finger, k] >= 0:
+            tip = chains.joints[finger, k]
+    r, t = surface.rotation, surface.translation
+    for i in range(3):
+        apart[i] = -positions[tip, i]
+        for j in range(3):
+            apart[i] += r[j, i] * (anchor[1 + j] * surface.scale - t[j])
+    weight = ANCHOR_WEIGHT * anchor[0]
+    bone = skeleton.parents[tip]
+    for k in range(CHAIN_LENGTH):
+        angle = chains.angles[finger, k]
+        columns[k, 0] = columns[k, 1] = columns[k, 2] = 0.0
+        if angle >= 0 and angle_moves(skeleton.angle_bones, angle, bone):
+            x, y, z = _jacobian_column(
+                axes[angle],
+                positions[skeleton.angle_bones[angle]],
+                positions[tip, 0],
+                positions[tip, 1],
+                positions[tip, 2],
+            )
+            columns[k, 0], columns[k, 1], columns[k, 2] = x, y, z
+    for a in range(CHAIN_LENGTH):
+        for i in range(3):
+            slope[a] += weight * columns[a, i] * apart[i]
+        for b in range(a + 1):
+            for i in range(3):
+                normal[a, b] += weight * columns[a, i] * columns[b, i]
 
 
 @inner
@@ -159,6 +207,8 @@ def solve_least_squares(
     confidence: float,
     limits: Array,
     surface: Surface,
+    grips: Array,
+    anchors: Array,
     angles: Array,
 ):
     """From a first guess in `angles (A,)` to better ones there, inside `limits (A, 2)`.
@@ -176,9 +226,16 @@ def solve_least_squares(
             normal[:] = 0.0
             for k in range(CHAIN_LENGTH):
                 angle = chains.angles[finger, k]
-                normal[k, k] = STAY_WEIGHT_M2 + 1e-9
-                slope[k] = STAY_WEIGHT_M2 * (predicted[angle] - angles[angle]) if angle >= 0 else 0.0
-            _add_targets(skeleton, chains, finger, positions, axes, targets, normal, slope)
+                stay = STAY_WEIGHT_M2 + grips[finger] * GRIP_WEIGHT_M2
+                normal[k, k] = stay + 1e-9
+                slope[k] = stay * (predicted[angle] - angles[angle]) if angle >= 0 else 0.0
+            _add_targets(
+                skeleton, chains, finger, positions, axes, targets, 1.0 - grips[finger], normal, slope
+            )
+            if anchors[4 * finger] > 0.0:
+                _add_anchor(
+                    skeleton, chains, finger, positions, axes, anchors[4 * finger : 4 * finger + 4], surface, normal, slope
+                )
             _add_surface(
                 skeleton,
                 chains,
@@ -186,7 +243,7 @@ def solve_least_squares(
                 positions,
                 axes,
                 distances,
-                confidences[finger],
+                max(confidences[finger], grips[finger]),
                 surface,
                 normal,
                 slope,
