@@ -19,7 +19,7 @@ LOOK_M = 0.010
 """Gaps below this are computed exactly."""
 EDGES = 4
 """Edges of the friction cone."""
-SAMPLES = 6
+SAMPLES = 7
 PALM_START = 0.3
 """The palm's capsules begin at the wrist, where there is no skin to touch with."""
 _contact = stack_array(8)

@@ -96,13 +96,9 @@ def correct_by_wrench(problem: Problem, angles: Array, correction: Array):
     rotation, translation, targets, reference = matrix(), vector(), _targets(), _reference()
     surface = _place_surface(problem, rotation, translation, targets)
     confidence = grasp_confidence(problem.wrist, problem.object, problem.other_wrist)
-    chains, grip = problem.chains, problem.grip
-    for finger in range(len(grip.weights)):
-        for k in range(CHAIN_LENGTH):
-            angle = chains.angles[finger, k]
-            if angle >= 0:
-                own = grip.weights[finger] * (grip.poses[angle] - problem.predicted[angle])
-                reference[angle] = problem.predicted[angle] + own
+    grip = problem.grip
+    for angle in range(len(angles)):
+        reference[angle] = clamp(problem.predicted[angle] + grip.offsets[angle], problem.limits, angle)
     for angle in range(len(angles)):
         angles[angle] = clamp(problem.predicted[angle] + correction[angle], problem.limits, angle)
     solve_least_squares(

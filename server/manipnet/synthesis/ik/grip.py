@@ -41,8 +41,8 @@ ENOUGH_M_S2 = 0.08 * GRAVITY_M_S2
 TAKE_CONFIDENCE, LEAVE_CONFIDENCE = 0.5, 0.1
 LEAVES_M = 0.012
 """A hand whose nearest finger is predicted to be farther than this from the object lets go."""
-SETTLE_TICKS = 8.0
-RISE, FALL = 0.3, 0.12
+SETTLE_TICKS = 14.0
+PACE = 0.3
 POSTURE_COST = 4.0
 TOUCH_BONUS = 0.3
 CANDIDATES = 12
@@ -72,24 +72,31 @@ class Grip(NamedTuple):
     """`(F,)` how much of its own pose a finger has, 0 to 1."""
     poses: Array
     """`(A,)` that pose, radians."""
+    offsets: Array
+    """`(A,)` what is added to the network's angles at present, radians."""
+    speeds: Array
+    """`(A,)` how that changes, radians per tick."""
     anchors: Array
     """`(4 F,)` per finger: how firmly its tip is held in place, 0 to 1, and that place in the object's own metres."""
 
 
 def grip_size(fingers: int, angles: int) -> int:
     """Numbers that one hand remembers."""
-    return HEAD + 2 * fingers + angles + 4 * fingers
+    return HEAD + 6 * fingers + 3 * angles
 
 
 @inner
 def unpack_grip(numbers: Array, fingers: int):
     """A row of `Poses.grip` as a `Grip`."""
+    first, angles = HEAD + 2 * fingers, (len(numbers) - HEAD - 6 * fingers) // 3
     return Grip(
         numbers[:HEAD],
         numbers[HEAD : HEAD + fingers],
-        numbers[HEAD + fingers : HEAD + 2 * fingers],
-        numbers[HEAD + 2 * fingers : len(numbers) - 4 * fingers],
-        numbers[len(numbers) - 4 * fingers :],
+        numbers[HEAD + fingers : first],
+        numbers[first : first + angles],
+        numbers[first + angles : first + 2 * angles],
+        numbers[first + 2 * angles : first + 3 * angles],
+        numbers[first + 3 * angles :],
     )
 
 
@@ -115,7 +122,7 @@ def _moved(obj: Array, start: int, stop: int):
 
 
 @inner
-def _update_hold(chains: Chains, windows: Windows, n: int, distances: Array, grip: Grip):
+def _update_hold(chains: Chains, windows: Windows, n: int, predicted: Array, distances: Array, grip: Grip):
     """Whether hand `n` holds its object, with hysteresis; advances the ages and weights of its fingers."""
     confidence = grasp_confidence(windows.wrist[n], windows.object[n], windows.other_wrist[n])
     nearest = np.inf
@@ -136,11 +143,16 @@ def _update_hold(chains: Chains, windows: Windows, n: int, distances: Array, gri
             grip.anchors[4 * finger] = 0.0
         if grip.head[HELD] == 0.0 or (away > LEAVES_M and confidence < TAKE_CONFIDENCE):
             grip.ages[finger] = 0.0
-        if grip.ages[finger] > 0.0:
+        chosen = grip.ages[finger] > 0.0
+        if chosen:
             grip.ages[finger] += 1.0
-            grip.weights[finger] += RISE * (1.0 - grip.weights[finger])
-        else:
-            grip.weights[finger] -= FALL * grip.weights[finger]
+        grip.weights[finger] += 0.15 * ((1.0 if chosen else 0.0) - grip.weights[finger])
+        for k in range(CHAIN_LENGTH):
+            a = chains.angles[finger, k]
+            if a >= 0:
+                wanted = grip.poses[a] - predicted[a] if chosen else 0.0
+                grip.speeds[a] += PACE * (PACE * (wanted - grip.offsets[a]) - 2.0 * grip.speeds[a])
+                grip.offsets[a] += grip.speeds[a]
 
 
 @inner
@@ -322,7 +334,7 @@ def improve_grips(
     """Look after the grips of hands `first … last - 1`: `predicted (N, A)`, their angles `(N, A)`, `grips (N, G)`."""
     fingers = len(chains.angles)
     for n in range(first, last):
-        _update_hold(chains, windows, n, distances[n], unpack_grip(grips[n], fingers))
+        _update_hold(chains, windows, n, predicted[n], distances[n], unpack_grip(grips[n], fingers))
     for n in range(first, last):
         seen = False
         for m in range(first, n):
@@ -380,6 +392,8 @@ def _improve_object(
         count = _hand_wrenches(contacts[h], chains, -1, solid, scale, columns, count)
         _hold_tips(chains, contacts[h], positions, rotation_all[h], translation_all[h], scale, grip)
     left = _worst(columns, count, directions, shares, wanted)
+    for h in range(hands):
+        grips[int(members[h]), SPARE] = left
     if left <= ENOUGH_M_S2:
         column = 0
         for h in range(hands):
