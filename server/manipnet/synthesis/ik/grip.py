@@ -31,8 +31,8 @@ from manipnet.synthesis.sensing.scene import object_from_wrist
 from manipnet.synthesis.ik.grasp import ARM_M, grasp_confidence
 from manipnet.synthesis.rotations import quat_to_matrix_into
 
-HELD, CURSOR, SPARE = 0, 1, 2
-HEAD = 3
+HELD, CURSOR, SPARE, FAILS = 0, 1, 2, 3
+HEAD = 4
 MAX_HANDS = 4
 GRAVITY_M_S2 = 9.81
 MARGIN = 0.2
@@ -49,6 +49,7 @@ CANDIDATES = 12
 BETTER_M_S2 = 0.2
 NEARBY = 0.6
 LOCK = False
+PATIENCE, PLAIN_COUNTS = 6.0, 3.0
 ANCHOR_GAP_M, ANCHOR_REACH_M, FOLLOW = 0.004, 0.012, 0.05
 HELD_TICKS = 14
 _columns = stack_array(MAX_HANDS * MAX_CAPSULES * EDGES, SIZE)
@@ -140,7 +141,7 @@ def _update_hold(chains: Chains, windows: Windows, n: int, predicted: Array, dis
             if c >= 0:
                 away = min(away, min(distances[chains.starts[c]], distances[chains.ends[c]]) - chains.radii[c])
         if grip.head[HELD] == 0.0:
-            grip.anchors[4 * finger] = 0.0
+            grip.anchors[4 * finger] *= 0.8
         if grip.head[HELD] == 0.0 or (away > LEAVES_M and confidence < TAKE_CONFIDENCE):
             grip.ages[finger] = 0.0
         chosen = grip.ages[finger] > 0.0
@@ -301,8 +302,8 @@ def _hold_tips(chains, contacts, positions, rotation, translation, scale, grip):
                 joint = chains.joints[finger, k]
         anchor = grip.anchors[4 * finger : 4 * finger + 4]
         p = positions[joint]
-        if capsule < 0 or contacts[capsule, 0] > ANCHOR_GAP_M:
-            anchor[0] = 0.0
+        gap = contacts[capsule, 0] if capsule >= 0 else np.inf
+        if anchor[0] == 0.0 and gap > ANCHOR_GAP_M:
             continue
         far = 0.0
         for i in range(3):
@@ -312,8 +313,9 @@ def _hold_tips(chains, contacts, positions, rotation, translation, scale, grip):
                 anchor[1 + i] = at
             far += (at - anchor[1 + i]) ** 2
             anchor[1 + i] += FOLLOW * (at - anchor[1 + i])
-        anchor[0] += 0.25 * (1.0 - anchor[0])
-        if far * scale * scale > ANCHOR_REACH_M**2:
+        keep = gap < 2.0 * ANCHOR_GAP_M and far * scale * scale < ANCHOR_REACH_M**2
+        anchor[0] += 0.2 * ((1.0 if keep else 0.0) - anchor[0])
+        if anchor[0] < 0.05:
             anchor[0] = 0.0
 
 
@@ -391,9 +393,12 @@ def _improve_object(
                     contacts[h, chains.capsules[finger, k], 7] = finger
         count = _hand_wrenches(contacts[h], chains, -1, solid, scale, columns, count)
         _hold_tips(chains, contacts[h], positions, rotation_all[h], translation_all[h], scale, grip)
+    plain = unexplained_for(columns, count, directions, 0.0, 0.0, shares, wanted)
     left = _worst(columns, count, directions, shares, wanted)
     for h in range(hands):
         grips[int(members[h]), SPARE] = left
+    m0 = int(members[0])
+    grips[m0, FAILS] = 0.0 if left <= ENOUGH_M_S2 else grips[m0, FAILS] + (1.0 if plain <= ENOUGH_M_S2 else PLAIN_COUNTS)
     if left <= ENOUGH_M_S2:
         column = 0
         for h in range(hands):
@@ -419,8 +424,9 @@ def _improve_object(
     future, past = _moved(obj, PRESENT, PRESENT + 3), _moved(obj, PRESENT - 3, PRESENT)
     if future < 0.004 and past > 0.002:
         return
+    if grips[m0, FAILS] < PATIENCE:
+        return
     # one finger a tick: the hands in turn, each from the thumb on
-    m0 = int(members[0])
     turn = int(grips[m0, CURSOR])
     wide = turn >= hands * fingers
     grips[m0, CURSOR] = (turn + 1) % (2 * hands * fingers)
@@ -428,6 +434,8 @@ def _improve_object(
     h, finger = turn % hands, turn // hands
     m = int(members[h])
     grip = unpack_grip(grips[m], fingers)
+    if 0.0 < grip.ages[finger] < SETTLE_TICKS:
+        return
     count = 0
     for other in range(hands):
         count = _hand_wrenches(
