@@ -42,14 +42,14 @@ TAKE_CONFIDENCE, LEAVE_CONFIDENCE = 0.5, 0.1
 LEAVES_M = 0.012
 """A hand whose nearest finger is predicted to be farther than this from the object lets go."""
 SETTLE_TICKS = 14.0
-PACE = 0.3
+PACE = 0.35
 POSTURE_COST = 4.0
 TOUCH_BONUS = 0.3
 CANDIDATES = 12
 BETTER_M_S2 = 0.2
 NEARBY = 0.6
 LOCK = False
-PATIENCE, PLAIN_COUNTS = 6.0, 3.0
+PATIENCE, PLAIN_COUNTS = 5.0, 5.0
 ANCHOR_GAP_M, ANCHOR_REACH_M, FOLLOW = 0.004, 0.012, 0.05
 HELD_TICKS = 14
 _columns = stack_array(MAX_HANDS * MAX_CAPSULES * EDGES, SIZE)
