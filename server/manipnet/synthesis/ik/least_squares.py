@@ -21,7 +21,7 @@ SAMPLES = 4
 TARGET_WEIGHT = 1.0
 SURFACE_WEIGHT = 6.0
 GRIP_WEIGHT_M2 = 4e-3
-ANCHOR_WEIGHT = 4.0
+ANCHOR_WEIGHT = 1.5
 STAY_WEIGHT_M2 = 4e-5
 """Pull toward the network's angles, in square metres per square radian."""
 ALLOWED_DEPTH_M = 0.002
