@@ -118,14 +118,6 @@ def correct_by_wrench(problem: Problem, angles: Array, correction: Array):
 
 
 @inner
-def leave_grips(
-    skeleton, chains, limits, solid, windows, first, last, predicted, angles, distances, grips
-):
-    """No grips."""
-    return
-
-
-@inner
 def correct_by_ccd(problem: Problem, angles: Array, correction: Array):
     """The paper's solver."""
     rotation, translation, targets = matrix(), vector(), _targets()

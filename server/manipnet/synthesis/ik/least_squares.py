@@ -12,6 +12,7 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_FINGERS, 
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.ik.chains import Surface, angle_moves, capsule_sample, clamp
 from manipnet.synthesis.ik.depenetration import open_deep_fingers
+from manipnet.synthesis.ik.grip import ANCHOR
 from manipnet.synthesis.ik.grasp import finger_confidences_into
 from manipnet.synthesis.sensing.scene import map_direction_back
 
@@ -232,10 +233,9 @@ def solve_least_squares(
             _add_targets(
                 skeleton, chains, finger, positions, axes, targets, 1.0 - grips[finger], normal, slope
             )
-            if anchors[4 * finger] > 0.0:
-                _add_anchor(
-                    skeleton, chains, finger, positions, axes, anchors[4 * finger : 4 * finger + 4], surface, normal, slope
-                )
+            anchor = anchors[ANCHOR * finger : ANCHOR * (finger + 1)]
+            if anchor[0] > 0.0:
+                _add_anchor(skeleton, chains, finger, positions, axes, anchor, surface, normal, slope)
             _add_surface(
                 skeleton,
                 chains,

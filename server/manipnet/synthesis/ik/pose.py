@@ -16,8 +16,9 @@ from manipnet.jit import inner, kernel, stack_array
 from manipnet.synthesis.hand.hand import MAX_ANGLES, Hand, Indices, Skeleton
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.hand.packed import unpack_chains, unpack_skeleton
-from manipnet.synthesis.ik.correction import Problem, correct_nothing, leave_grips
+from manipnet.synthesis.ik.correction import Problem, correct_nothing
 from manipnet.synthesis.ik.grip import grip_size, unpack_grip
+from manipnet.synthesis.ik.holding import Hands, leave_grips
 from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.decode import decode_into, unpack_output_columns
 from manipnet.synthesis.model.features import Windows
@@ -141,9 +142,8 @@ def _pose(
         )
         _correct(problem, poses.angles[n], poses.correction[n])
         _settle(skeleton, predicted, axes, n, poses)
-    _improve(
-        skeleton, chains, limits, solid, windows, first, last, poses.predicted, poses.angles, poses.distances, poses.grip
-    )
+    posed = poses.predicted, poses.angles, poses.distances, poses.grip
+    _improve(Hands(skeleton, chains, limits, solid, windows, first, last, *posed))
 
 
 def make_pose_kernel(correct: Callable[..., Any], improve: Callable[..., Any], name: str) -> Callable[..., None]:

@@ -17,7 +17,7 @@ class Solver:
     """One line for a person who chooses."""
     correct: str
     """`module:function` of its compiled step; `correction` describes the arguments."""
-    improve: str = "manipnet.synthesis.ik.correction:leave_grips"
+    improve: str = "manipnet.synthesis.ik.holding:leave_grips"
     """`module:function` that looks after the grips of all hands when they are posed."""
 
 
@@ -34,7 +34,7 @@ SOLVERS: Final = {
             "wrench",
             "least squares, and contacts that can carry what is held",
             f"{_CORRECTION}:correct_by_wrench",
-            "manipnet.synthesis.ik.grip:improve_grips",
+            "manipnet.synthesis.ik.holding:improve_grips",
         ),
         Solver("ccd", "the paper's cyclic coordinate descent", f"{_CORRECTION}:correct_by_ccd"),
         Solver("none", "no correction", f"{_CORRECTION}:correct_nothing"),
