@@ -61,6 +61,8 @@ PATIENCE_TICKS = 5
 """A grip that carries the weight but not a push may be that short of it for this long."""
 BETTER_M_S2, POSTURE_M_S2 = 0.2, 4.0
 """What a new pose must improve; what a square radian of change costs."""
+AT_OBJECT_M = 0.02
+"""A hand with no capsule this near is not at the object."""
 _STEPS = 3
 _STOPPED_M, _CAME_M = 0.004, 0.002
 """An object that moves less than the first from now on, and more than the second until now, is being put down."""
@@ -301,10 +303,26 @@ def _look_after(hands: Hands, first: int, work: Work):
         return
     # the fingers in turn, each first near its present pose; in the next round each over its whole range
     fingers = len(hands.chains.angles)
-    turn = int(leader[NEXT_FINGER])
-    leader[NEXT_FINGER] = (turn + 1) % (2 * holders * fingers)
-    wide = turn >= holders * fingers
-    _improve_finger(hands, turn % holders, turn // holders % fingers, holders, wide, worst, work)
+    rounds = holders * fingers
+    for _ in range(rounds):
+        turn = int(leader[NEXT_FINGER])
+        leader[NEXT_FINGER] = (turn + 1) % (2 * rounds)
+        h, finger = turn % holders, turn // holders % fingers
+        if _may_help(hands, h, finger, work):
+            _improve_finger(hands, h, finger, holders, turn >= rounds, worst, work)
+            return
+
+
+@inner
+def _may_help(hands: Hands, h: int, finger: int, work: Work):
+    """Whether a finger is not on its way already, and its hand is at the object."""
+    grip = unpack_grip(hands.grips[int(work.numbers[h])], len(hands.chains.angles))
+    if 0.0 < grip.ages[finger] < ARRIVING_TICKS:
+        return False
+    for c in range(len(hands.chains.radii)):
+        if work.contacts[h, c, 0] < AT_OBJECT_M:
+            return True
+    return False
 
 
 @inner
@@ -312,8 +330,6 @@ def _improve_finger(hands: Hands, h: int, finger: int, holders: int, wide: bool,
     """Give a finger of holder `h` the pose that helps most, if one helps."""
     n, chains, best, chosen = int(work.numbers[h]), hands.chains, worst - BETTER_M_S2, -1
     grip, costs, poses, contact = unpack_grip(hands.grips[n], len(chains.angles)), _costs(), _poses(), _contact()
-    if 0.0 < grip.ages[finger] < ARRIVING_TICKS:
-        return
     others = 0
     for other in range(holders):
         others = _add_hand(hands, other, finger if other == h else -1, work, others)
