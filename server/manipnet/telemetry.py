@@ -1,4 +1,4 @@
-"""What one session counts and measures: one `Telemetry` object, which is handed down to whoever reports something.
+"""What one session counts and measures: one `Telemetry` object, which is passed to everything that reports something.
 
 Every counter has one label. The counters are declared here, with the values that their labels may take; the protocols
 add theirs with `Telemetry.declare` when they open. The sets are closed from then on, so a sender cannot make them grow.
@@ -28,6 +28,7 @@ BODY_REASONS = (
     "nan",
     "bounds",
     "zero_quaternion",
+    "conflict",  # two bodies have the same id or name
     "frozen",  # tracked, but bit-identical for too long
     "jump",  # farther from the last sample than a body can move
     "swap",  # two bodies in each other's place from one frame to the next
@@ -45,7 +46,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "bodies_rejected": ("reason", BODY_REASONS),
     "sender_restarts": ("source", ()),
     "receiver_restarts": ("source", ()),
-    "connections_refused": ("reason", ("handshake", "not_listed", "too_many", "endless")),
+    "connections_refused": ("reason", ("handshake", "socket_type", "not_listed", "too_many", "endless")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),

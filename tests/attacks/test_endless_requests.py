@@ -112,7 +112,8 @@ def test_a_recording_that_begins_lets_others_be_answered(server: LiveServer, tmp
         {"op": "select_object", "body": "Box", "object": "cube", "scale": 10**400},
         {"op": "add_object", "file": "a\0b.ply"},
         {"op": "select_object", "body": "a\x1b[31m\n", "object": "cube"},
-        {"op": "record", "name": "COM1"},
+        {"op": "add_object", "file": "/tmp/\ud800.ply"},
+        *({"op": "record", "name": name} for name in ("COM1", "com¹", "LPT9.mcap", "nul", "Aux .x", "con.take")),
     ],
 )
 def test_what_makes_no_sense_is_refused_by_its_reason(server: LiveServer, request_: dict) -> None:

@@ -110,6 +110,26 @@ def test_names_are_shown_as_text_and_run_nothing(tiny_bundle: Path, chromium: st
                 sender.close()
 
 
+def test_names_of_files_and_errors_about_them_run_nothing(tiny_bundle: Path, chromium: str, tmp_path: Path) -> None:
+    takes, objects = tmp_path / "takes", tmp_path / "objects"
+    for folder in (takes, objects):
+        folder.mkdir()
+        for name in (PICTURE, LINK):
+            (folder / f"{name}{'.mcap' if folder is takes else '.stl'}").write_bytes(b"neither a take nor a mesh")
+    options = ("--mesh", "Box=cube", "--model", str(tiny_bundle), "--takes", str(takes), "--objects", str(objects))
+    with serving(*options) as server, browsing(chromium, server.addresses["page"], tmp_path / "profile") as page:
+        page.click("Takes", BROWSER_S)
+        page.wait_for("[...document.querySelectorAll('input')].some(one => one.value.endsWith('.mcap'))", BROWSER_S)
+        page.choose("Take", f"{PICTURE}.mcap")
+        page.click("Show this take")
+        page.wait_for(f"{TEXT}.includes('not a recording')", BROWSER_S)
+        page.click("Objects")
+        page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'Box')", BROWSER_S)
+        page.choose("Object", PICTURE)
+        page.wait_for(f"{TEXT}.includes({json.dumps(f'{PICTURE}.stl')})", BROWSER_S)
+        assert page.evaluate("window.hit === undefined && document.querySelector('img[onerror]') === null")
+
+
 def test_no_frame_of_a_foreign_page_shows_it(server: LiveServer, chromium: str, tmp_path: Path) -> None:
     folder = tmp_path / "evil"
     folder.mkdir()

@@ -15,11 +15,13 @@ from natnet_writer import Body, Frame, packet, server_info
 from manipnet.inputs.natnet import NATNET
 from manipnet.inputs.natnet import client as natnet_client
 from manipnet.inputs.natnet.client import NatNetBodies
+from manipnet.inputs.natnet.definitions import Definitions
 from manipnet.inputs.natnet.frames import read_frame
+from manipnet.inputs.natnet.names import Names
 from manipnet.inputs.natnet.options import COMMAND_PORT, NatNetOptions
 from manipnet.net.errors import ListenError
 
-VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5)]
+VERSIONS = [(2, 7), (2, 8), (2, 9), (2, 10), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5)]
 Q = (0.0, 0.6, 0.0, 0.8)
 
 
@@ -137,6 +139,126 @@ def test_names_are_requested_again_when_a_frame_asks_for_it(connect, heard):
         stream_until_named(motive, heard, "new")
 
 
+def test_names_are_requested_at_once_for_an_id_that_nobody_has_named(connect, heard):
+    with FakeMotive(names={1: "left_wrist", 2: "Box"}) as motive:
+        connect(motive)
+        stream_until_named(motive, heard, "left_wrist")
+        motive.names = {1: "left_wrist", 7: "Box"}
+        for number in itertools.count(1000):
+            motive.send(write((3, 0), number, bodies=[Body(1), Body(7)]))
+            if heard.next().bodies[1].name == "Box":
+                return
+
+
+def test_an_id_that_the_server_does_not_name_is_asked_for_ever_less_often():
+    names, frame = Names(), read_frame(write((3, 0), full=False), (3, 0))
+    asked = []
+    for tenth in range(6_000):
+        names.note(frame)
+        if names.should_ask(0.1 * tenth, 1.0):
+            asked.append(0.1 * tenth)
+            names.define(Definitions())
+    assert asked[:3] == pytest.approx([0.0, 2.0, 6.0])
+    assert 20 < len(asked) < 30
+
+
+def test_two_bodies_with_one_id_are_refused_and_named(connect, heard, warnings):
+    with FakeMotive(names=[(1, "left_wrist"), (3, "Box"), (3, "Stick")]) as motive:
+        client = connect(motive)
+        assert "'Box' and 'Stick' have the streaming id 3" in warnings.get(timeout=20)
+        motive.send(write((3, 0), bodies=[Body(1), Body(3), Body(3, (2, 1, 2))]))
+        bodies = heard.next().bodies
+        assert [(body.id, body.name, body.tracked, body.fault) for body in bodies] == [
+            (1, "left_wrist", True, None),
+            (3, None, False, "conflict"),
+        ]
+        assert "'Box' and 'Stick'" in client.status()["conflicts"][0]
+
+
+def test_an_id_that_occurs_twice_only_in_the_frames_is_named_too(connect, heard, warnings):
+    with FakeMotive(names={3: "Box"}) as motive:
+        connect(motive)
+        motive.wait_for(12)
+        motive.send(write((3, 0), bodies=[Body(3), Body(3, (2, 1, 2))]))
+        assert heard.next().bodies[0].fault == "conflict"
+        assert "the streaming id 3 occurs twice in each frame" in warnings.get(timeout=20)
+
+
+def test_a_name_that_occurs_twice_is_no_name(connect, heard, warnings):
+    with FakeMotive(names=[(1, "Box"), (2, "Box")]) as motive:
+        connect(motive)
+        assert "the streaming ids 1 and 2 have the name 'Box'" in warnings.get(timeout=20)
+        motive.send(write((3, 0)))
+        assert [(body.id, body.name) for body in heard.next().bodies] == [(1, None), (2, None)]
+
+
+@pytest.mark.parametrize("version", [(2, 10), (3, 1), (4, 2)])
+def test_bones_of_skeletons_are_bodies_by_name(connect, heard, version):
+    with FakeMotive(version, {1: "Box"}) as motive:
+        motive.skeletons = {5: ("Ann", {9: "Ann_LHand", 13: "RHand"}), 6: ("Bob", {9: "LHand"})}
+        client = connect(motive)
+        motive.wait_for(12)
+        hands = {5: [Body(5 << 16 | 9, (1, 2, 3)), Body(5 << 16 | 13, params=0)], 6: [Body(9)], 7: [Body(1)]}
+        motive.send(write(version, bodies=[Body(1)], skeletons=hands))
+        bodies = heard.next().bodies
+        assert [(body.id, body.name, body.tracked) for body in bodies] == [
+            (1, "Box", True),
+            (None, "Ann:LHand", True),
+            (None, "Ann:RHand", False),
+            (None, "Bob:LHand", True),
+        ]
+        assert bodies[1].p == (1.0, 2.0, 3.0)
+        status = client.status()
+        assert status["bones"] == ["Ann:LHand", "Ann:RHand", "Bob:LHand"]
+        assert status["unused"]["bones without a name"] == 1
+        assert status["unused"]["labelled markers"] == 6
+
+
+def test_a_name_in_another_encoding_is_shown_and_matched(heard, telemetry):
+    with FakeMotive(names={1: "Würfel".encode("cp1252"), 2: "手".encode("shift_jis")}) as motive:
+        client = NatNetBodies(
+            NATNET.intake(heard, telemetry), NatNetOptions(("127.0.0.1", motive.port)), bodies=frozenset({"手"})
+        )
+        client.start()
+        motive.wait_for(12)
+        motive.send(write((3, 0)))
+        assert [body.name for body in heard.next().bodies] == ["Würfel", "手"]
+        assert client.status()["bodies"] == {"1": "Würfel", "2": "手"}
+        client.stop()
+
+
+def test_timecode_and_its_rate_are_passed_on(connect, heard):
+    with FakeMotive() as motive:
+        connect(motive)
+        motive.wait_for(4)
+        for k in range(4 * 50):
+            second, frame = divmod(k // 2, 25)
+            motive.send(write((3, 0), k, timecode=0x0A_00_00_00 | second << 8 | frame, timestamp_s=k / 50))
+        frames = [heard.next() for _ in range(4 * 50)]
+        assert [frames[0].timecode, frames[53].timecode] == ["10:00:00:00", "10:00:01:01"]
+        assert [frames[0].timecode_rate, frames[-1].timecode_rate] == [None, 25.0]
+
+
+def test_a_frame_without_timecode_has_none(connect, heard):
+    with FakeMotive() as motive:
+        connect(motive)
+        motive.wait_for(4)
+        motive.send(write((3, 0), timecode=0))
+        assert heard.next().timecode is None
+
+
+def test_time_stamps_that_stand_still_give_way_to_the_arrivals(connect, heard):
+    with FakeMotive() as motive:
+        client = connect(motive)
+        motive.wait_for(4)
+        for k in range(60):
+            motive.send(write((3, 0), k, timestamp_s=0.0))
+            frame = heard.next()
+            time.sleep(1 / 120)
+        assert frame.t_s == pytest.approx(frame.t_received_s, abs=0.2)
+        assert client.status()["clock"] == {"used": "arrival", "set_aside": {"time stamp": "stands still"}}
+
+
 def test_the_clock_is_known_within_its_uncertainty(connect, heard):
     with FakeMotive() as motive:
         client = connect(motive)
@@ -178,7 +300,8 @@ def test_a_server_that_restarts_with_another_version_is_followed(connect, heard,
         assert heard.next().frame == 1
         port = motive.port
     with FakeMotive((4, 2), port=port) as motive:
-        motive.wait_for(4)
+        motive.wait_for(0)  # the client may ask for names before it connects
+        motive.wait_for(4, motive.requests.get(4, 0) + 1)
         motive.send(write((4, 2), 2))
         assert heard.next().frame == 2
 
@@ -199,8 +322,8 @@ def test_multicast(connect, heard):
     ("options", "info", "expected"),
     [
         ({}, server_info(group="239.255.42.99"), "start with --multicast, or choose Unicast"),
-        ({}, server_info(version=(2, 9)), "speaks NatNet 2.9, and this program understands 3.0"),
-        ({}, server_info(version=(5, 1)), "speaks NatNet 5.1, and this program understands 3.0"),
+        ({}, server_info(version=(2, 6)), "speaks NatNet 2.6, and this program understands 2.7"),
+        ({}, server_info(version=(5, 1)), "speaks NatNet 5.1, and this program understands 2.7"),
         ({"multicast": True}, server_info(group="10.0.0.1"), "cannot join multicast 10.0.0.1:1511"),
     ],
 )

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from natnet_writer import Body, Frame, definitions, packet, server_info
 
-from manipnet.inputs.natnet.frames import read_body_names, read_frame
+from manipnet.inputs.natnet.definitions import read_definitions
+from manipnet.inputs.natnet.frames import read_frame
 from manipnet.inputs.natnet.protocol import (
     MessageId,
     check_version,
@@ -22,7 +23,7 @@ from manipnet.inputs.natnet.protocol import (
 )
 from manipnet.wire.bodies import MessageError
 
-VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5)]
+VERSIONS = [(2, 7), (2, 8), (2, 9), (2, 10), (3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 3), (4, 4), (4, 5)]
 
 
 @pytest.fixture(params=VERSIONS, ids=lambda v: f"{v[0]}.{v[1]}")
@@ -69,7 +70,7 @@ def test_capture_handshake():
     info = read_server_info(answers[MessageId.SERVER_INFO])
     assert (info.application, info.application_version, info.version) == ("Motive", (2, 1, 0, 0), (3, 0))
     assert (info.clock_hz, info.data_port, info.multicast_group) == (3_312_787, 1511, "239.255.42.99")
-    assert read_body_names(answers[MessageId.MODEL_DEFINITIONS], info.version) == {2: "RaceQuad"}
+    assert read_definitions(answers[MessageId.MODEL_DEFINITIONS], info.version).names() == {2: "RaceQuad"}
     sent, server_ticks = read_echo(answers[MessageId.ECHO_RESPONSE])
     assert sent.to_bytes(8, "little") == answers[MessageId.ECHO_REQUEST]
     assert server_ticks == 0x0149CDD8380F
@@ -81,7 +82,7 @@ def test_single_packets_of_the_capture():
     read = {path.name: read_packet(path.read_bytes()) for path in folder.glob("*_v3.bin")}
     assert read["requestmodeldef_packet_v3.bin"] == (MessageId.MODEL_REQUEST, b"")
     assert read_frame(read["mocapframe_packet_v3.bin"][1], (3, 0)).number == 162_734
-    assert read_body_names(read["modeldef_packet_v3.bin"][1], (3, 0)) == {2: "RaceQuad"}
+    assert read_definitions(read["modeldef_packet_v3.bin"][1], (3, 0)).names() == {2: "RaceQuad"}
     assert read_echo(read["echoresponse_packet_v3.bin"][1])[0] == 0x109A664E
 
 
@@ -92,7 +93,11 @@ def test_single_packets_of_the_capture():
 def test_bodies_and_time_are_found_behind_every_section(version, full):
     frame = read_frame(Frame(full=full).write(version), version)
     assert (frame.number, frame.timestamp_s) == (7, 12.5)
-    assert (frame.exposed_ticks, frame.received_ticks, frame.transmitted_ticks) == (1_000, 2_000, 3_000)
+    stamps = (frame.exposed_ticks, frame.received_ticks, frame.transmitted_ticks)
+    assert stamps == ((1_000, 2_000, 3_000) if version >= (3, 0) else (0, 0, 0))
+    assert frame.timecode == "01:02:03:04"
+    assert [(each.id, len(each.bones)) for each in frame.skeletons] == ([(9, 3)] if full else [])
+    assert frame.unused.get("labelled markers", 0) == (6 if full else 0)
     assert [(body.id, body.tracked) for body in frame.bodies] == [(1, True), (2, False)]
     assert frame.bodies[0].p == pytest.approx((0.1, 0.2, 0.3))
     assert frame.bodies[0].q == (0.0, 0.0, 0.0, 1.0)
@@ -121,18 +126,53 @@ def test_only_the_tracked_bit_counts(version):
 
 def test_names_are_found_behind_every_kind_of_definition(version):
     names = {2: "RaceQuad", 1_001: "left wrist", 5: "Tässchen"}
-    assert read_body_names(definitions(names, version), version) == names
+    assert read_definitions(definitions(names, version), version).names() == names
+
+
+def test_bones_have_the_names_of_skeleton_and_bone(version):
+    skeletons = {5: ("Ann", {1: "Hip", 9: "Ann_LHand", 13: "RHand"}), 6: ("Bob", {9: "LHand"})}
+    found = read_definitions(definitions({}, version, skeletons), version)
+    assert found.bones == {(5, 1): "Ann:Hip", (5, 9): "Ann:LHand", (5, 13): "Ann:RHand", (6, 9): "Bob:LHand"}
+    assert found.skeletons == {5: "Ann", 6: "Bob"}
+
+
+def test_ids_and_names_that_occur_twice_are_refused_by_name(version):
+    bodies = [(3, "Box"), (3, "Stick"), (4, "Cup"), (5, "Cup"), (6, "left")]
+    found = read_definitions(definitions(bodies, version), version)
+    assert found.names() == {6: "left"}
+    of_id, of_name = found.conflicts()
+    assert "'Box' and 'Stick' have the streaming id 3" in of_id
+    assert "the streaming ids 4 and 5 have the name 'Cup'" in of_name
+
+
+def test_names_in_other_encodings_are_read(version):
+    raw = {1: "Würfel".encode("cp1252"), 2: "左手".encode("shift_jis"), 3: "手".encode("shift_jis")}
+    assert read_definitions(definitions(raw, version), version, frozenset({"手"})).names() == {
+        1: "Würfel",
+        2: "左手",
+        3: "手",
+    }
+
+
+@pytest.mark.parametrize(
+    ("packed", "text"),
+    [(0, None), (0x17_3B_3B_1D, "23:59:59:29"), (0x18_00_00_00, None), (0x01_3C_00_00, None), (0xFFFFFFFF, None)],
+)
+def test_timecode(version, packed, text):
+    assert read_frame(Frame(timecode=packed).write(version), version).timecode == text
 
 
 def test_unreadable_names_are_left_out(version):
-    assert read_body_names(definitions({1: "", 2: "a\nb", 3: "x" * 200, 4: "ok"}, version), version) == {4: "ok"}
+    assert read_definitions(definitions({1: "", 2: "a\nb", 3: "x" * 200, 4: "ok"}, version), version).names() == {
+        4: "ok"
+    }
 
 
 def test_a_later_version_with_longer_bodies_is_still_read():
     bodies = [Body(1), Body(2)]
     for body in bodies:
         written = body.write()
-        body.write = lambda written=written: written + b"more"
+        body.write = lambda version, written=written: written + b"more"
     frame = read_frame(Frame(bodies=bodies).write((4, 5)), (4, 9))
     assert [body.id for body in frame.bodies] == [1, 2]
 
@@ -141,8 +181,8 @@ def test_definitions_of_an_unknown_kind_are_skipped_if_their_size_is_known():
     known = definitions({4: "Box"}, (4, 1))
     count = struct.unpack_from("<i", known)[0]
     data = struct.pack("<iii", count + 1, 99, 3) + b"???" + known[4:]
-    assert read_body_names(data, (4, 1)) == {4: "Box"}
-    assert read_body_names(struct.pack("<ii", 1, 99), (3, 0)) == {}
+    assert read_definitions(data, (4, 1)).names() == {4: "Box"}
+    assert read_definitions(struct.pack("<ii", 1, 99), (3, 0)).names() == {}
 
 
 @pytest.mark.parametrize("group", [None, "239.255.42.99"])
@@ -153,10 +193,10 @@ def test_server_info(version, group):
     check_version(info.version)
 
 
-@pytest.mark.parametrize("version", [(2, 9), (2, 10), (5, 0), (0, 0)])
+@pytest.mark.parametrize("version", [(2, 6), (1, 9), (5, 0), (0, 0)])
 def test_versions_that_are_not_understood_are_named(version):
     with pytest.raises(
-        MessageError, match=rf"speaks NatNet {version[0]}\.{version[1]}, and this program understands 3\.0 "
+        MessageError, match=rf"speaks NatNet {version[0]}\.{version[1]}, and this program understands 2\.7 "
     ):
         check_version(version)
 
@@ -227,7 +267,7 @@ def digest(data, version):
         read_server_info,
         read_echo,
         lambda payload: read_frame(payload, version),
-        lambda payload: read_body_names(payload, version),
+        lambda payload: read_definitions(payload, version),
     ):
         with contextlib.suppress(MessageError):
             read(data)

@@ -22,7 +22,9 @@ from manipnet.inputs.osc.packet import (
     time_tag_to_s,
 )
 from manipnet.wire.bodies import MessageError
+from manipnet.wire.text import read_text
 
+CYRILLIC = "\u042f\u0449\u0438\u043a"
 MESSAGE = b"/a\0\0,i\0\0\0\0\0\7"
 
 
@@ -57,15 +59,15 @@ def test_bundles_are_read_in_order_with_their_time():
     inner = OscBundleBuilder(1)
     inner.add_content(message("/two", 2))
     builder.add_content(inner.build())
-    messages = split_packet(builder.build().dgram)
+    messages = split_packet(builder.build().dgram).messages
     assert [read(message) for _, message in messages] == [("/one", (1,)), ("/two", (2,))]
     assert time_tag_to_s(messages[0][0]) == pytest.approx(1_000.5, abs=1e-6)
 
 
 def test_innermost_time_tag_counts_unless_it_says_immediately():
     data = bundle(MESSAGE, bundle(MESSAGE), bundle(MESSAGE, tag=9 << 32), tag=5 << 32)
-    assert [tag >> 32 for tag, _ in split_packet(data)] == [5, 5, 9]
-    assert split_packet(MESSAGE) == [(IMMEDIATELY, MESSAGE)]
+    assert [tag >> 32 for tag, _ in split_packet(data).messages] == [5, 5, 9]
+    assert split_packet(MESSAGE).messages == [(IMMEDIATELY, MESSAGE)]
 
 
 def nested(depth):
@@ -92,7 +94,6 @@ def nested(depth):
         (bundle(b"zzzz"), "must be '/'"),
         (nested(MAX_DEPTH + 1), "nested"),
         (nested(1_000), "nested"),
-        (bundle(*[b"/a\0\0"] * (MAX_MESSAGES + 1)), "more than"),
         (bytes(MAX_DATAGRAM_BYTES + 4), "are allowed"),
     ],
 )
@@ -102,12 +103,53 @@ def test_wrong_packets_are_named(data, expected):
 
 
 @pytest.mark.parametrize(
+    ("data", "fault"),
+    [
+        (bundle(MESSAGE, b"zzzz", MESSAGE), "must be '/'"),
+        (bundle(MESSAGE, b"/ab", MESSAGE), "multiple of 4"),
+        (bundle(MESSAGE, nested(MAX_DEPTH), MESSAGE), "nested"),
+        (bundle(MESSAGE, MESSAGE) + struct.pack(">i", 2**31 - 1), "0 bytes are left"),
+        (bundle(MESSAGE, MESSAGE) + struct.pack(">i", -4) + MESSAGE, "size -4"),
+    ],
+)
+def test_a_wrong_part_of_a_bundle_costs_only_itself(data, fault):
+    messages, (found,) = split_packet(data)
+    assert [message for _, message in messages] == [MESSAGE, MESSAGE]
+    assert fault in found
+
+
+def test_the_first_messages_of_a_bundle_that_is_too_large_are_read():
+    messages, (fault,) = split_packet(bundle(*[MESSAGE] * (MAX_MESSAGES + 1)))
+    assert len(messages) == MAX_MESSAGES
+    assert "more than" in fault
+
+
+@pytest.mark.parametrize(
+    ("raw", "expected", "text"),
+    [
+        ("Würfel".encode(), (), "Würfel"),
+        ("Würfel".encode("cp1252"), (), "Würfel"),
+        ("左手".encode("shift_jis"), (), "左手"),
+        ("あ".encode("shift_jis"), (), "あ"),
+        ("手".encode("shift_jis"), (), "Žè"),  # the bytes do not tell
+        ("手".encode("shift_jis"), ("手",), "手"),
+        (CYRILLIC.encode("cp1251"), (CYRILLIC, 3), CYRILLIC),
+        ("Łuk".encode("cp1250"), (), "Łuk"),
+        (b"\xff\xfe", (), "ÿþ"),
+    ],
+)
+def test_text_of_other_encodings_is_read(raw, expected, text):
+    assert read_text(raw, expected) == text
+    padded = raw + bytes(4 - len(raw) % 4)
+    assert read_arguments(b"/a\0\0,s\0\0" + padded, 8 - 4, expected) == (text,)
+
+
+@pytest.mark.parametrize(
     ("data", "expected"),
     [
         (b"/abc", "does not end"),
         (b"/ab\0,i\0x\0\0\0\7", "does not end"),
         (b"/a\0x,i\0\0\0\0\0\7", "does not end"),
-        (b"/\xff\xfe\0,i\0\0\0\0\0\7", "not UTF-8"),
         (b"/*\0\0,i\0\0\0\0\0\7", "without any of"),
         (b"/\n\0\0,i\0\0\0\0\0\7", "printable"),
         (b"/" + b"a" * 299 + bytes(4), "256"),
@@ -118,7 +160,6 @@ def test_wrong_packets_are_named(data, expected):
         (b"/a\0\0,Q\0\0\0\0\0\7", "'Q' is unknown"),
         (b"/a\0\0,i\0\0\0\0\0\7\0\0\0\7", "4 bytes after"),
         (b"/a\0\0,s\0\0abcd", "does not end"),
-        (b"/a\0\0,s\0\0\xff\xfe\0\0", "not UTF-8"),
         (b"/a\0\0,b\0\0\xff\xff\xff\xff", "size -1"),
         (b"/a\0\0,b\0\0\0\0\0\x05abcd", "size 5"),
         (b"/a\0\0,b\0\0", "0 bytes are left"),
@@ -131,7 +172,7 @@ def test_wrong_messages_are_named(data, expected):
 
 def digest(data):
     with contextlib.suppress(MessageError):
-        for _, message in split_packet(data):
+        for _, message in split_packet(data).messages:
             read(message)
 
 

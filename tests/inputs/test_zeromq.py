@@ -9,7 +9,6 @@ import zmq
 
 from manipnet.inputs.zeromq import ZEROMQ
 from manipnet.inputs.zeromq.receiver import ZmqBodies
-from manipnet.net.errors import ListenError
 from manipnet.net.zmq_socket import MAX_WIRE_BYTES
 from manipnet.wire.bodies import MAX_MESSAGE_BYTES
 
@@ -118,37 +117,6 @@ def test_a_sink_that_fails_does_not_end_the_stream(telemetry, heard, context, ca
     assert "digest" in caplog.text
 
 
-def test_stop_frees_the_port_and_start_takes_it_again(heard, telemetry, context):
-    threads = threading.active_count()
-    port = 0
-    for n in range(3):
-        receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=port)
-        receiver.start()
-        port = int(receiver.address.rpartition(":")[2])
-        with sender(context, receiver.address) as publisher:
-            publisher.send(msgpack.packb(message(n)))
-            assert heard.next().frame == n
-        receiver.stop()
-        receiver.stop()
-    assert threading.active_count() == threads
-
-
-def test_port_in_use_is_named(receiver, heard, telemetry):
-    port = int(receiver.address.rpartition(":")[2])
-    with pytest.raises(ListenError, match=rf"{port}: Address already in use; choose a port that is free"):
-        ZmqBodies(ZEROMQ.intake(heard, telemetry), port=port).start()
-
-
-@pytest.mark.parametrize("host", ["no-such-host.invalid", "300.1.1.1", "203.0.113.5"])
-def test_wrong_host_is_named(heard, telemetry, host):
-    with pytest.raises(ListenError, match=host):
-        ZmqBodies(ZEROMQ.intake(heard, telemetry), host=host, port=0).start()
-
-
-def test_stop_without_start(heard, telemetry):
-    ZmqBodies(ZEROMQ.intake(heard, telemetry)).stop()
-
-
 @pytest.mark.parametrize("host", ["localhost", "::1"])
 def test_other_spellings_of_loopback(heard, telemetry, context, host):
     receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), host=host, port=0)
@@ -158,3 +126,71 @@ def test_other_spellings_of_loopback(heard, telemetry, context, host):
         publisher.send(msgpack.packb(message(1)))
         assert heard.next().frame == 1
     receiver.stop()
+
+
+@pytest.fixture
+def trackers(context):
+    """Two trackers that bind their PUB sockets, and their addresses."""
+    sockets = [context.socket(zmq.XPUB) for _ in range(2)]
+    for socket in sockets:
+        socket.setsockopt(zmq.LINGER, 0)
+    yield [(socket, ("127.0.0.1", socket.bind_to_random_port("tcp://127.0.0.1"))) for socket in sockets]
+    for socket in sockets:
+        socket.close()
+
+
+def test_trackers_that_bind_are_connected_to(heard, telemetry, trackers, context):
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0, trackers=tuple(address for _, address in trackers))
+    receiver.start()
+    for n, (socket, _) in enumerate(trackers):
+        assert socket.poll(20_000)
+        socket.recv()
+        socket.send(msgpack.packb(message(n)))
+        assert heard.next().frame == n
+    with sender(context, receiver.address) as publisher:  # and others may still connect
+        publisher.send(msgpack.packb(message(9)))
+        assert heard.next().frame == 9
+    addresses = [f"tcp://{host}:{port}" for _, (host, port) in trackers]
+    assert receiver.status()["trackers"] == dict.fromkeys(addresses, True)
+    receiver.stop()
+    receiver.stop()
+
+
+def test_a_tracker_that_starts_late_and_restarts_is_found(heard, telemetry, context):
+    with context.socket(zmq.XPUB) as probe:
+        port = probe.bind_to_random_port("tcp://127.0.0.1")
+    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0, trackers=(("127.0.0.1", port),))
+    receiver.start()
+    assert receiver.status()["trackers"] == {f"tcp://127.0.0.1:{port}": False}
+    for n in range(2):
+        with context.socket(zmq.XPUB) as tracker:
+            tracker.setsockopt(zmq.LINGER, 0)
+            tracker.bind(f"tcp://127.0.0.1:{port}")
+            assert tracker.poll(20_000)
+            tracker.recv()
+            tracker.send(msgpack.packb(message(n)))
+            assert heard.next().frame == n
+    receiver.stop()
+
+
+def test_a_push_socket_is_refused_as_the_wrong_type(receiver, telemetry, context, caplog):
+    with context.socket(zmq.PUSH) as push:
+        push.setsockopt(zmq.LINGER, 0)
+        push.connect(receiver.address)
+        while "socket_type" not in telemetry.counts().get("connections_refused", {}):
+            assert threading.Event().wait(0.02) is False
+    assert "a PUSH, say): use a PUB socket that connects here" in caplog.text
+    assert "keys" not in caplog.text
+
+
+@pytest.mark.parametrize(("t_of", "fault"), [(lambda n: 0.0, "stands still"), (lambda n: 1e3 * n / 120, "jumps by")])
+def test_a_t_that_is_no_clock_gives_way_to_the_arrival(receiver, heard, context, t_of, fault):
+    with sender(context, receiver.address) as publisher:
+        for n in range(40):
+            publisher.send(msgpack.packb({**message(n), "t": t_of(n)}))
+            frame = heard.next()
+            threading.Event().wait(1 / 120)
+    assert frame.t_s == pytest.approx(frame.t_received_s, abs=0.15)
+    (report,) = receiver.status()["senders"].values()
+    assert report["clock"]["used"] == "arrival"
+    assert fault in report["clock"]["set_aside"]["t"]

@@ -27,6 +27,7 @@ class FakeMotive:
         self.version = version
         self.info = info or server_info(version, CLOCK_HZ, data_port, group)
         self.models = models
+        self.skeletons = None
         self.names = {} if names is None else names
         self.clock_offset_s = 5_000.0
         self.requests = {}
@@ -88,7 +89,7 @@ class FakeMotive:
             case 0 | 14:
                 return packet(1, self.info)
             case 4:
-                return packet(5, self.models or definitions(self.names, self.version))
+                return packet(5, self.models or definitions(self.names, self.version, self.skeletons))
             case 12:
                 ticks = int((time.monotonic() + self.clock_offset_s) * CLOCK_HZ)
                 return packet(13, payload[:8] + struct.pack("<Q", ticks))

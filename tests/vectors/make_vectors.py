@@ -67,6 +67,7 @@ def messages() -> dict[str, HandsMessage]:
         "many_bodies": replace(base, bodies=tuple(body(i, f"body {i}", i % 3 > 0) for i in range(40))),
         "no_hands": replace(base, session="", actor="演者", hands={}, bodies=(), look_ahead=0.0),
         "long_names": replace(base, session=long_name, bodies=(body(1, long_name),)),
+        "timecode": replace(base, timecode="23:59:58;29", timecode_rate=29.96875),
     }
 
 

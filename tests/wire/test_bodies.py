@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from manipnet.wire.bodies import MAX_BODIES, MAX_MESSAGE_BYTES, MessageError, parse_bodies
+from manipnet.wire.bodies import MAX_BODIES, MAX_MESSAGE_BYTES, MessageError, bodies_map, parse_bodies
 
 BODY = {"id": 7, "name": "Box", "p": [0.1, 1, -2.5], "q": [0, 0, 0, 2], "tracked": False}
 MESSAGE = {"t": 12.5, "frame": 3, "bodies": [BODY]}
@@ -34,6 +34,25 @@ def test_message_is_read_whole(encode):
     assert body.q == (0.0, 0.0, 0.0, 1.0)
 
 
+def test_timecode_is_kept(encode):
+    frame = parse_bodies(encode({**MESSAGE, "timecode": "10:20:30;04", "timecode_rate": 29.97}), 0.0, "zmq")
+    assert (frame.timecode, frame.timecode_rate) == ("10:20:30;04", 29.97)
+    assert parse_bodies(encode(bodies_map(frame)), 0.0, "zmq") == frame
+
+
+def test_a_null_that_is_missing_means_tracked(encode):
+    assert parse_bodies(encode(with_body(tracked=None)), 0.0, "zmq").bodies[0].tracked
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-8"])
+def test_names_of_another_encoding_are_read(encoding):
+    name = "Würfel".encode(encoding)
+    packed = msgpack.packb(with_body(name="?")).replace(b"\xa1?", bytes([0xA0 + len(name)]) + name)
+    assert parse_bodies(packed, 0.0, "zmq").bodies[0].name == "Würfel"
+    text = json.dumps(with_body(name="?")).encode().replace(b'"?"', b'"' + name + b'"')
+    assert parse_bodies(text, 0.0, "zmq").bodies[0].name == "Würfel"
+
+
 @pytest.mark.parametrize(
     "message",
     [
@@ -42,6 +61,10 @@ def test_message_is_read_whole(encode):
         with_body(id=...),
         with_body(name=...),
         with_body(tracked=..., id=-1),
+        with_body(tracked=None, name=None),
+        with_body(name=""),
+        with_body(id=None),
+        {**MESSAGE, "timecode": None, "timecode_rate": None},
         {**MESSAGE, "bodies": [{**BODY, "id": i, "name": None} for i in range(MAX_BODIES)]},
     ],
 )
@@ -70,7 +93,10 @@ def test_optional_parts_may_be_missing(encode, message):
         (with_body(id=..., name=...), "neither id nor name"),
         (with_body(id="7"), "bodies[0].id is '7'"),
         (with_body(id=1 << 31), "31 bits"),
-        (with_body(name=""), "bodies[0].name is ''"),
+        (with_body(id=..., name=""), "neither id nor name"),
+        ({**MESSAGE, "timecode": "1:2:3"}, "timecode is '1:2:3'; it must be HH:MM:SS:FF"),
+        ({**MESSAGE, "timecode": "24:00:00:00"}, "timecode is '24:00:00:00'"),
+        ({**MESSAGE, "timecode_rate": 0}, "timecode_rate is 0; it must be a number above 0"),
         (with_body(name="a\nb"), "printable"),
         (with_body(name="x" * 129), "128"),
         (with_body(tracked=1), "bodies[0].tracked is 1"),

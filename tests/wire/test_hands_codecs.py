@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from manipnet import wire
 from manipnet.wire.bodies import MessageError
-from manipnet.wire.hands import BODY, HAND, HEADER
+from manipnet.wire.hands import BODY, HAND, HEADER, TIMED_HEADER
 
 MESSAGES = make_vectors.messages()
 EXPECTED = json.loads((VECTORS / "expected.json").read_text(encoding="utf-8"))
@@ -41,6 +41,20 @@ def test_msgpack_reads_as_expected(name):
     assert message.session == MESSAGES[name].session
 
 
+def test_timecode_is_in_both_encodings_and_missing_without_one():
+    timed = MESSAGES["timecode"]
+    for encode, decode in (wire.encode_binary, wire.decode_binary), (wire.encode_msgpack, wire.decode_msgpack):
+        message = decode(encode(timed))
+        assert message.timecode == "23:59:58;29"
+        assert message.timecode_rate == 29.96875
+        assert decode(encode(LIVE)).timecode is None
+    old = msgpack.unpackb(wire.encode_msgpack(LIVE))
+    assert old.pop("timecode") is None
+    assert old.pop("timecode_rate") is None
+    assert wire.decode_msgpack(msgpack.packb(old)).timecode is None
+    assert make_vectors.offset(TIMED_HEADER, "timecode") == HEADER.itemsize == 208
+
+
 @pytest.mark.parametrize("path", sorted(VECTORS.glob("bad_*.bin")), ids=lambda p: p.stem)
 def test_broken_binary_is_refused(path):
     with pytest.raises(MessageError):
@@ -59,6 +73,8 @@ def test_another_version_is_refused_and_both_are_named():
     [
         ({"t_capture": float("nan")}, "t_capture"),
         ({"seq": -1}, "seq"),
+        ({"timecode": "1:2"}, "timecode"),
+        ({"timecode": "01:02:03:04", "timecode_rate": float("nan")}, "timecode_rate"),
         ({"hands": {"middle": LIVE.hands["left"]}}, "middle"),
         ({"hands": {"left": replace(LIVE.hands["left"], state="dead")}}, "hands.left.state"),
         ({"hands": {"left": replace(LIVE.hands["left"], scale=0.0)}}, "hands.left.scale"),

@@ -13,7 +13,7 @@ from manipnet.common.text_output import accept_any_text
 @dataclass(frozen=True)
 class Verb:
     """A verb and the module that does it: `module.run(options)` if there is a class of options, else
-    `module.main(argv)`."""
+    `module.main(argv)`. Options are checked before the module, and so its libraries, are imported."""
 
     summary: str
     module: str
@@ -91,6 +91,16 @@ VERBS = {
             "--data DATASET --model models/mine --json figures.json",
         ),
     ),
+    "import": Verb(
+        "make takes for training out of public sets and glove takes",
+        "manipnet_tools.importing.command",
+        "manipnet_tools.importing.options.ImportOptions",
+        (
+            'taco TACO --out DATA --only "(stir, *"            some of the TACO set (CC BY 4.0)',
+            "dexterhand DEXTERHAND --out DATA                 the DexterHand set, with the hands as BVH",
+            "bvh gloves --mesh Mug=mug.obj --out DATA         folders of a studio's own glove takes",
+        ),
+    ),
     "train": Verb(
         "train a model on captured takes",
         "manipnet_tools.training.train",
@@ -111,8 +121,8 @@ VERBS = {
     ),
     "bench": Verb(
         "measure how long each stage of a tick takes",
-        "manipnet_tools.bench",
-        None,
+        "manipnet_tools.bench.command",
+        "manipnet_tools.bench.options.BenchOptions",
         ("--only tick --seconds 20", "--json figures.json"),
     ),
     "doctor": Verb(
@@ -207,6 +217,7 @@ def _run(name: str, verb: Verb, rest: list[str]) -> int:
         if verb.options is None:
             return importlib.import_module(verb.module).main(rest) or 0
         options = _parsed(name, verb.options, rest)
+        options.check()
     except SystemExit as end:
         if not end.code and verb.examples:
             print("\nexamples:", *(f"  manipnet {name} {example}" for example in verb.examples), sep="\n")

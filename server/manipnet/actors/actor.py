@@ -17,6 +17,7 @@ from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene, HandState
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import TICK_S, BodyAtTick, BodyHealth, Tick
+from manipnet.tracking.timecodes import Timecode, Timecodes
 from manipnet.tracking.timeline import Timeline
 from manipnet.wire import SIDES, Side, State
 from manipnet.wire.bodies import BodyFrame
@@ -45,6 +46,7 @@ class Actor:
         }
         self._telemetry = telemetry
         self._roles, self._timeline = BodyRoles(config), Timeline(look_ahead_s)
+        self._timecodes = Timecodes()
         self._last: tuple[int, int] | None = None
         self._tracked: frozenset[str] = frozenset()
         """The roles whose bodies were tracked at the newest tick."""
@@ -67,12 +69,12 @@ class Actor:
 
     @property
     def sender_restarts(self) -> int:
-        """How often the sender's time began anew."""
+        """How often the sender's clock restarted."""
         return self._timeline.restarts
 
     @property
     def ticks_skipped(self) -> int:
-        """How many ticks were not shown because they fell due all at once or a sender began anew."""
+        """How many ticks were not shown because they fell due all at once or a sender restarted."""
         return self._timeline.skipped_late + self._timeline.skipped_at_restart
 
     def push(self, frame: BodyFrame) -> str | None:
@@ -83,14 +85,20 @@ class Actor:
         poses = self._roles.poses(frame)
         if not poses:
             return "unknown_body"
+        if frame.timecode is not None:
+            self._timecodes.note(frame.t_s, frame.timecode, frame.timecode_rate)
         restarts = self._timeline.restarts
         reason = self._timeline.push(frame.t_s, poses, frame.t_received_s, frame.source)
         if self._timeline.restarts > restarts:
             self._telemetry.count("sender_restarts", source=frame.source.partition(":")[0])
         return reason
 
+    def timecode(self, t_s: float) -> Timecode:
+        """The timecode of an instant of stream time, as far as the tracker sends one."""
+        return self._timecodes.at(t_s)
+
     def poll(self, now_s: float) -> Tick | None:
-        """The next tick that is due at `now_s`, if any; to be called again until there is none."""
+        """The next tick that is due at `now_s`, or None. Call this again until it returns None."""
         timeline = self._timeline
         late, at_restart = timeline.skipped_late, timeline.skipped_at_restart
         tick = timeline.poll(now_s)
@@ -139,7 +147,7 @@ class Actor:
         kept = {prop.name for prop in self.config.objects} | {hand.prop for hand in self.hands.values()}
         free = [prop.name for prop in self.props if prop.name not in kept]
         if not free:
-            raise ValueError(f"{self.config.name} has {MAX_OBJECTS} props already, which are of the rig or held")
+            raise ValueError(f"{self.config.name} already has {MAX_OBJECTS} props, all of them in the rig or held")
         name = next((name for name in free if name not in self._tracked), free[0])
         self.props = [prop for prop in self.props if prop.name != name]
         self._roles.forget(name)
@@ -246,7 +254,7 @@ class Actor:
         return state_at_age(max(ages))
 
     def _elapsed_s(self, tick: Tick) -> float:
-        """Stream time since the last tick that was shown; one tick if the sender began anew in between."""
+        """Stream time since the last tick that was shown; one tick if the sender restarted in between."""
         if self._last is None or self._last[0] != tick.run:
             return TICK_S
         return (tick.index - self._last[1]) * TICK_S

@@ -21,6 +21,7 @@ def hands_message(
     latency: Latency,
 ) -> HandsMessage:
     """The message of one tick; it takes the actor's next sequence number."""
+    timecode, timecode_rate = actor.timecode(tick.time_s)
     message = HandsMessage(
         session=session,
         actor=actor.config.name,
@@ -33,6 +34,8 @@ def hands_message(
             BodyPose(body.age_s <= HOLD_AFTER_S, body.pose, name) for name, body in sorted(tick.bodies.items())
         ),
         latency_ms=latency,
+        timecode=timecode,
+        timecode_rate=timecode_rate,
     )
     actor.seq += 1
     return message

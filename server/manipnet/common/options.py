@@ -160,6 +160,37 @@ class HostPort(Kind):
         return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
+@dataclass(frozen=True)
+class Endpoints(Kind):
+    """Addresses of other programs, each with its port."""
+
+    scheme: str
+    repeatable = True
+
+    @property
+    def metavar(self) -> str:
+        return f"{self.scheme}://HOST:PORT"
+
+    @property
+    def allowed(self) -> str:
+        return f"addresses of the form {self.scheme}://HOST:PORT with a port of 1 … 65535"
+
+    def read(self, value: Any, folder: Path) -> tuple[Endpoint, ...]:
+        texts = _require(value, isinstance(value, list) and all(isinstance(text, str) for text in value))
+        return tuple(self._endpoint(text) for text in texts)
+
+    def _endpoint(self, text: str) -> Endpoint:
+        scheme, found, rest = text.partition("://")
+        host, port = _split_endpoint(rest if found else text, 0)
+        return _require((host, port), port > 0 and scheme in ((self.scheme,) if found else (text,)))
+
+    def write(self, value: tuple[Endpoint, ...]) -> list[str]:
+        return [
+            f"{self.scheme}://[{host}]:{port}" if ":" in host else f"{self.scheme}://{host}:{port}"
+            for host, port in value
+        ]
+
+
 class Networks(Kind):
     """Addresses and networks."""
 
@@ -208,6 +239,8 @@ class Option:
     def _converted(self, convert: Callable[[], Any], value: Any, where: str) -> Any:
         try:
             return convert()
+        except ConfigError as error:  # the kind knows better what is wrong
+            raise ConfigError(f"{where} {error}") from None
         except ValueError:
             raise ConfigError(f"{where} is {shorten(value)}; it must be {self.kind.allowed}") from None
 
@@ -219,9 +252,9 @@ class Protocol:
     name: str
     """Its name in the counters."""
     summary: str
-    """Who sends or receives by it and how, in a few words."""
+    """A few words on who uses it, and how."""
     options: type
-    """The dataclass of its options. The first one says where: the port to listen on, or the other program's address."""
+    """The dataclass of its options. The first one is the port to listen on, or the other program's address."""
     ready_name: str = field(default="", kw_only=True)
     """Its name in the `ready` line and in the request `status`, if that is not `name`."""
 
@@ -232,7 +265,7 @@ class Protocol:
 
     @property
     def where(self) -> Option:
-        """The option that says where."""
+        """The option for its port or address."""
         return options_of(self.options)[0]
 
     @property
@@ -290,7 +323,7 @@ def parse_endpoint(text: str, default_port: int) -> Endpoint:
 
 
 def shorten(value: Any) -> str:
-    """A value as an error message shows it: not more than a line of it."""
+    """A value as error messages show it, in at most one line."""
     text = repr(value)
     return text if len(text) <= 60 else f"{type(value).__name__} of {len(text)} characters"
 

@@ -1,7 +1,9 @@
 """What a request is, how its values are checked, and how it is refused."""
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -70,6 +72,15 @@ def body_key(request: Request) -> int | str:
         return check_name(body, "body")
     except MessageError as error:
         raise RequestError(str(error)) from None
+
+
+def is_writable_name(path: Path) -> bool:
+    """Whether the system can write the name of a file in its encoding, which under `LANG=C` may be ASCII."""
+    try:
+        os.fsencode(path)
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def quoted(value: Any) -> str:

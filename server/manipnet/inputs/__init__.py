@@ -27,6 +27,7 @@ def make_receivers(
     host: str,
     keys: "ServerKeys | None" = None,
     allow: tuple[Network, ...] = (),
+    bodies: frozenset[int | str] = frozenset(),
 ) -> dict[Input, Receiver]:
     """A receiver for every input that its options, which `options_of` finds by their class, turn on.
 
@@ -36,7 +37,7 @@ def make_receivers(
     for declared in INPUTS:
         options = options_of(declared.options)
         if declared.is_on(options):
-            reception = Reception(declared.intake(sink, telemetry), host, keys, allow)
+            reception = Reception(declared.intake(sink, telemetry), host, keys, allow, bodies)
             made[declared] = declared.open(options, reception)
             telemetry.add_gauges(made[declared].gauges)
     return made

@@ -30,6 +30,8 @@ class Reception:
     """The keys that senders must have where a protocol knows keys."""
     allow: tuple[Network, ...] = ()
     """The networks that may send; empty if any may."""
+    bodies: frozenset[int | str] = frozenset()
+    """The bodies of the rig by id or name. They help to read names that are not written in UTF-8."""
 
 
 class Receiver:

@@ -22,11 +22,14 @@ SOON_MS: Final = 20
 """When to look again after a handshake has succeeded."""
 _LOG_PERIOD_S: Final = 5.0
 _REFUSED: Final = {
-    "handshake": "a client that has the wrong keys, or that does not speak ZMTP 3",
+    "handshake": "a client that does not speak ZMTP 3{keys}, or whose socket is not a {peer} socket",
+    "socket_type": "a client whose socket has the wrong type (a PUSH, say): use a {peer} socket that connects here",
     "not_listed": "a client whose key is not in clients.allow",
     "too_many": "a client, since too many are connected or in the handshake",
     "endless": "a client that sends frames without end, but no message",
 }
+_PEERS: Final = {zmq.SUB: "PUB", zmq.PUB: "SUB", zmq.XPUB: "SUB", zmq.REP: "REQ", zmq.ROUTER: "REQ"}
+"""The type of socket that may connect to a socket."""
 _EVENTS: Final = zmq.Event.LISTENING | zmq.Event.ACCEPTED | zmq.Event.HANDSHAKE_SUCCEEDED | zmq.Event.DISCONNECTED
 _log = logging.getLogger(__name__)
 
@@ -53,6 +56,8 @@ class AccessControl:
         self._telemetry, self._failed = telemetry, failed
         self._answer = open_door if keys is None else ClientList(keys).answer
         self.connections = Connections(most, self._refuse, curve=keys is not None)
+        self._peer = _PEERS.get(socket.type, "matching")
+        self._keys = "" if keys is None else ", that has the wrong keys"
         self._log_throttle = LogThrottle(_LOG_PERIOD_S)
         if keys is not None:
             secure_server(socket, keys)
@@ -88,11 +93,13 @@ class AccessControl:
         look_s = time.monotonic()
         while True:
             wait_ms = SOON_MS if self.connections.unsettled else LOOK_MS
-            for socket, _ in poller.poll(wait_ms):
-                if socket is self._monitor:
-                    self._guarded(self._note, socket.recv_multipart())
-                else:
-                    socket.send_multipart(self._reply(socket.recv_multipart()))
+            events = self._monitor in dict(poller.poll(wait_ms))
+            for _ in range(MOST_CONNECTIONS):  # before the events, which tell how the handshake of a client went on
+                if not self._zap.poll(0):
+                    break
+                self._zap.send_multipart(self._reply(self._zap.recv_multipart()))
+            if events:
+                self._guarded(self._note, self._monitor.recv_multipart())
             if time.monotonic() - look_s >= 1e-3 * wait_ms:
                 look_s = time.monotonic()
                 self._guarded(self.connections.look)
@@ -125,7 +132,9 @@ class AccessControl:
             if self._log_throttle.admit("internal") is not None:
                 _log.exception("a client was refused, since its key could not be checked")
             reply, is_listed = [*request[:2], b"500", b"internal", b"", b""], False
-        if not is_listed:
+        if is_listed:
+            self.connections.let_in()
+        else:
             self.connections.denied()
             self._refuse("not_listed")
         return reply
@@ -133,4 +142,4 @@ class AccessControl:
     def _refuse(self, reason: str) -> None:
         self._telemetry.count("connections_refused", reason=reason)
         if self._log_throttle.admit(reason) is not None:
-            _log.warning("refused (%s) %s", reason, _REFUSED[reason])
+            _log.warning("refused (%s) %s", reason, _REFUSED[reason].format(peer=self._peer, keys=self._keys))

@@ -36,7 +36,7 @@ _CURVE_BYTES: Final = _GREETING_BYTES + 170
 """What a CURVE server has sent before the handshake is complete: its greeting and WELCOME (RFC 26)."""
 
 Refuse = Callable[[str], None]
-"""Called with the reason why a connection was refused or closed: `handshake`, `too_many` or `endless`."""
+"""Called with the reason why a connection was refused: `handshake`, `socket_type`, `too_many` or `endless`."""
 
 
 @dataclass(slots=True)
@@ -54,18 +54,19 @@ class _Connection:
 
 
 class Connections:
-    """The open connections, as the socket's events tell. One thread calls everything but `delivered` and `len`."""
+    """The open connections, as the socket's events report. One thread calls everything but `delivered` and `len`."""
 
     def __init__(
         self, most: int, refuse: Refuse, curve: bool = False, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`most` connections are admitted. `curve` tells that the handshake is CURVE's, not NULL's."""
+        """`most` connections are admitted. `curve` says whether the handshake is CURVE's or NULL's."""
         self._most, self._refuse, self._clock = most, refuse, clock
         self._curve = curve
         self._port = 0
         self._open: dict[int, _Connection] = {}
-        self._succeeded = self._denied = 0
-        """Handshakes that succeeded or were denied, of which it is not known yet to which connections they belong."""
+        self._succeeded = self._denied = self._let_in = 0
+        """Handshakes that succeeded, were denied, or got as far as a client that may connect, of which it is not known
+        yet to which connections they belong."""
         self._delivered: set[int] = set()
         self._admitted = 0
 
@@ -91,7 +92,12 @@ class Connections:
     def succeeded(self) -> None:
         """Note that the handshake of one of the connections is complete."""
         self._succeeded += 1
+        self._let_in = max(self._let_in - 1, 0)
         self.look()
+
+    def let_in(self) -> None:
+        """Note that a client that may connect is in the handshake. If it fails now, its socket has the wrong type."""
+        self._let_in += 1
 
     def denied(self) -> None:
         """Note that one of the connections was refused for its key, which the caller has counted."""
@@ -108,6 +114,9 @@ class Connections:
             self._succeeded -= 1
         elif self._denied:
             self._denied -= 1
+        elif self._let_in:
+            self._let_in -= 1
+            self._refuse("socket_type")
         else:
             self._refuse("handshake")
 
@@ -180,7 +189,7 @@ class Connections:
         return ""
 
     def _traffic(self, descriptor: int, connection: _Connection) -> tuple[int, int]:
-        """All bytes that were received and acknowledged, or those from before if the system does not tell."""
+        """All bytes that were received and acknowledged, or the number from before if the system does not report it."""
         if sys.platform == "linux":
             with self._borrowed(descriptor) as tcp:
                 if tcp is not None:

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-import zmq
-
 SERVER_FILE = "server.toml"
 ALLOW_FILE = "clients.allow"
 KEY_CHARS = 40
@@ -124,6 +122,8 @@ def read_allow_list(path: Path) -> dict[str, str]:
 
 
 def _new_pair() -> KeyPair:
+    import zmq  # reading keys, and the command line about keys, take no ZeroMQ
+
     if not zmq.has("curve"):
         raise KeyFileError("this build of ZeroMQ has no CURVE encryption; install the pyzmq wheel from PyPI")
     public, secret = zmq.curve_keypair()

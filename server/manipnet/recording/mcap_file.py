@@ -35,7 +35,7 @@ BODIES: Final = "/bodies"
 HANDS: Final = "/hands"
 TF: Final = "/tf"
 ABOUT: Final = "manipnet"
-"""Name of the metadata record, which holds model, model_hash, rig and whatever else the writer knew."""
+"""Name of the metadata record, which holds model, model_hash, rig and everything else that the writer knew."""
 FLUSH_NS: Final = 250_000_000
 """A killed process loses at most this much, by the clock of the log times."""
 MAX_RECORD_BYTES: Final = 1 << 28
@@ -175,7 +175,8 @@ def bodies_of(message: HandsMessage) -> BodyFrame:
         BodySample(None, body.name, tuple(body.pose[:3].tolist()), tuple(body.pose[3:].tolist()), body.tracked)
         for body in message.bodies
     ]
-    return BodyFrame(message.t_capture, message.seq, tuple(bodies), message.t_publish, "hands")
+    timecode = message.timecode, message.timecode_rate
+    return BodyFrame(message.t_capture, message.seq, tuple(bodies), message.t_publish, "hands", *timecode)
 
 
 def read_about(path: Path | str) -> About:

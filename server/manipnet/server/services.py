@@ -53,7 +53,7 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     page = LivePage(page_host, config.page_port, dispatcher.submit, telemetry, session.bundle.folder / HAND_FILE)
     opened.callback(page.stop)
     page.start()
-    receivers = make_receivers(config.of, session.senders, telemetry, config.host, keys, config.allow)
+    receivers = make_receivers(config.of, session.senders, telemetry, config.host, keys, config.allow, config.body_keys)
     start_receivers(receivers, opened)
     session.peers.receivers = {declared.title: receiver for declared, receiver in receivers.items()}
     session.peers.connected = lambda: {**publisher.connected(), "control": control.connected()}

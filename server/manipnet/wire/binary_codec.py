@@ -21,6 +21,7 @@ from manipnet.wire.hands import (
     PREAMBLE,
     RECORDS,
     STATES,
+    TIMED_HEADER,
     VERSION,
     BodyPose,
     HandPose,
@@ -36,16 +37,20 @@ def encode_binary(message: HandsMessage) -> bytes:
     Raises `MessageError` for a message that breaks a rule, for example with a number that is not finite.
     """
     check(message)
-    header = np.zeros((), HEADER)
+    header = np.zeros((), HEADER if message.timecode is None else TIMED_HEADER)
     hands = np.zeros(len(message.hands), HAND)
     bodies = np.zeros(len(message.bodies), BODY)
-    sizes = (HEADER.itemsize, HEADER.itemsize + hands.nbytes + bodies.nbytes, HAND.itemsize, BODY.itemsize)
+    size = header.itemsize
+    sizes = (size, size + hands.nbytes + bodies.nbytes, HAND.itemsize, BODY.itemsize)
     preamble = (MAGIC, VERSION, *sizes, len(hands), len(bodies))
     for name, value in zip(PREAMBLE.names or (), preamble, strict=True):
         header[name] = value
     _fill(header, message)
     for name in LATENCY.names or ():
         header["latency_ms"][name] = getattr(message.latency_ms, name)
+    if message.timecode is not None:
+        _fill_name(header["timecode"], message.timecode)
+        header["timecode_rate"] = message.timecode_rate or 0.0
     for record, (side, hand) in zip(hands, message.hands.items(), strict=True):
         record["side"], record["has_object"] = SIDES.index(side), hand.object is not None
         _fill(record, hand)
@@ -65,6 +70,7 @@ def decode_binary(payload: bytes) -> HandsMessage:
         hands={SIDES[_index(r["side"], SIDES, f"hands[{i}].side")]: _hand(r, i) for i, r in enumerate(hands)},
         bodies=tuple(BodyPose(**_read(BodyPose, r, f"bodies[{i}]")) for i, r in enumerate(bodies)),
         latency_ms=Latency(*(float(x) for x in header["latency_ms"].item())),
+        **_timecode(header),
     )
     if len(message.hands) != len(hands):
         raise MessageError("a hand occurs twice; a message has at most one left hand and one right hand")
@@ -89,7 +95,7 @@ def _split_records(payload: bytes) -> tuple[np.void, list[np.void], list[np.void
     if not len(payload) == total == pre["total_size"]:
         raise MessageError(f"the message has {len(payload)} bytes, but its header says {total}")
     return (
-        np.frombuffer(payload, HEADER, 1)[0],
+        np.frombuffer(payload, TIMED_HEADER if pre["header_size"] >= TIMED_HEADER.itemsize else HEADER, 1)[0],
         _records(payload, HAND, pre["header_size"], pre["hand_size"], pre["hand_count"]),
         _records(payload, BODY, first_body, pre["body_size"], pre["body_count"]),
     )
@@ -118,11 +124,23 @@ def _fill(record: Any, value: Any) -> None:
     for name, dtype in RECORDS[type(value)]:
         field_value = getattr(value, name)
         if dtype == NAME:
-            text = _cut(field_value or "")
-            record[name]["length"] = len(text)
-            record[name]["text"][: len(text)] = np.frombuffer(text, np.uint8)
+            _fill_name(record[name], field_value or "")
         else:
             record[name] = STATES.index(field_value) if name == "state" else field_value
+
+
+def _fill_name(record: Any, name: str) -> None:
+    text = _cut(name)
+    record["length"] = len(text)
+    record["text"][: len(text)] = np.frombuffer(text, np.uint8)
+
+
+def _timecode(header: np.void) -> dict[str, Any]:
+    """The timecode of a header that has one, as keyword arguments of `HandsMessage`."""
+    if "timecode" not in (header.dtype.names or ()):
+        return {}
+    text, rate = _text(header["timecode"], "header.timecode"), float(header["timecode_rate"])
+    return {"timecode": text or None, "timecode_rate": rate or None}
 
 
 def _read(cls: type, record: np.void, where: str) -> dict[str, Any]:

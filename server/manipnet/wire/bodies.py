@@ -12,6 +12,9 @@ from typing import Any
 
 import msgpack
 
+from manipnet.wire.text import read_text
+from manipnet.wire.timecode import MAX_RATE, is_rate, is_timecode
+
 MAX_MESSAGE_BYTES = 65_536
 MAX_BODIES = 256
 MAX_NAME_CHARS = 128
@@ -23,8 +26,10 @@ _FLOATS = {float}
 _FAR = MAX_COORDINATE_M
 _SMALLEST, _LARGEST = 1e-12, 1e12  # limits of a quaternion's squared length, beyond which it gives no rotation
 
-FAULTS = ("nan", "bounds", "zero_quaternion")
-"""Why a pose cannot be used: a number is not finite, the position is out of bounds, or there is no rotation."""
+CONFLICT = "conflict"
+FAULTS = ("nan", "bounds", "zero_quaternion", CONFLICT)
+"""Why a pose cannot be used: a number is not finite, the position is out of bounds, there is no rotation, or two bodies
+have the same id or name."""
 
 
 class MessageError(ValueError):
@@ -59,6 +64,10 @@ class BodyFrame:
     bodies: tuple[BodySample, ...]
     t_received_s: float
     source: str
+    timecode: str | None = None
+    """The SMPTE timecode of the instant, HH:MM:SS:FF, if the sender gives one."""
+    timecode_rate: float | None = None
+    """The timecode's frames per second, if the sender gives it."""
 
 
 def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
@@ -79,12 +88,23 @@ def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
         raise MessageError(f"bodies has {len(entries)} entries; at most {MAX_BODIES} are allowed")
     bodies = tuple([_body(entry, f"bodies[{i}]") for i, entry in enumerate(entries)])
     check_distinct(bodies)
-    return BodyFrame(t_s, frame, bodies, t_received_s, source)
+    timecode, rate = message.get("timecode"), message.get("timecode_rate")
+    if timecode is not None and not is_timecode(timecode):
+        raise MessageError(f"timecode is {_show(timecode)}; it must be HH:MM:SS:FF, or HH:MM:SS;FF for drop frame")
+    if rate is not None and not is_rate(rate):
+        raise MessageError(f"timecode_rate is {_show(rate)}; it must be a number above 0 and at most {MAX_RATE:g}")
+    return BodyFrame(t_s, frame, bodies, t_received_s, source, timecode, rate)
 
 
 def bodies_map(frame: BodyFrame) -> dict[str, Any]:
     """The map that `parse_bodies` reads from msgpack or JSON."""
-    return {"t": frame.t_s, "frame": frame.frame, "bodies": [_sample_map(body) for body in frame.bodies]}
+    timecode = {"timecode": frame.timecode, "timecode_rate": frame.timecode_rate}
+    return {
+        "t": frame.t_s,
+        "frame": frame.frame,
+        "bodies": [_sample_map(body) for body in frame.bodies],
+        **{key: value for key, value in timecode.items() if value is not None},
+    }
 
 
 def _sample_map(body: BodySample) -> dict[str, Any]:
@@ -132,25 +152,41 @@ def _decode(payload: bytes) -> Any:
     text = payload.lstrip(b" \t\r\n")
     try:
         if text.startswith((b"{", b"[")):
-            return json.loads(text.decode("utf-8"))
-        return msgpack.unpackb(payload, max_array_len=MAX_BODIES, max_map_len=MAX_BODIES)
+            return json.loads(read_text(text))
+        try:
+            return msgpack.unpackb(payload, max_array_len=MAX_BODIES, max_map_len=MAX_BODIES)
+        except UnicodeDecodeError:  # a name in another encoding
+            return _with_text(msgpack.unpackb(payload, raw=True, max_array_len=MAX_BODIES, max_map_len=MAX_BODIES))
     except (ValueError, TypeError, OverflowError, RecursionError, msgpack.UnpackException) as error:
         reason = str(error)[:120] or type(error).__name__
         raise MessageError(f"the message is neither a msgpack map nor a JSON object: {reason}") from None
 
 
+def _with_text(value: Any) -> Any:
+    """A value with all bytes in it as text."""
+    if isinstance(value, bytes):
+        return read_text(value)
+    if isinstance(value, list):
+        return [_with_text(each) for each in value]
+    if isinstance(value, dict):
+        return {_with_text(key): _with_text(each) for key, each in value.items()}
+    return value
+
+
 def _body(entry: object, where: str) -> BodySample:
     if not isinstance(entry, dict):
         raise MessageError(f"{where} is {_kind(entry)}; it must be a map with id or name, p and q")
-    id, name = entry.get("id"), entry.get("name")
+    id, name = entry.get("id"), entry.get("name") or None  # an empty name is what some languages write for none
     if id is None and name is None:
         raise MessageError(f"{where} has neither id nor name; it must have at least one of them")
     if id is not None and not _is_int(id, 31):
         raise MessageError(f"{where}.id is {_show(id)}; it must be an integer of at most 31 bits")
     if name is not None:
         check_name(name, f"{where}.name")
-    tracked = entry.get("tracked", True)
-    if not isinstance(tracked, bool):
+    tracked = entry.get("tracked")
+    if tracked is None:
+        tracked = True
+    elif not isinstance(tracked, bool):
         raise MessageError(f"{where}.tracked is {_show(tracked)}; it must be true or false")
     return make_sample(id, name, _numbers(entry, "p", 3, where), _numbers(entry, "q", 4, where), tracked)
 

@@ -88,6 +88,10 @@ class HandsMessage:
     bodies: tuple[BodyPose, ...] = ()
     latency_ms: Latency = Latency()
     v: int = VERSION
+    timecode: str | None = None
+    """SMPTE timecode HH:MM:SS:FF of the instant (";" before FF for drop frame), if the tracker sends one."""
+    timecode_rate: float | None = None
+    """The timecode's frames per second, if it is known."""
 
 
 Record = list[tuple[str, np.dtype]]
@@ -118,5 +122,19 @@ PREAMBLE: Final = np.dtype(
 
 LATENCY: Final = np.dtype(RECORDS[Latency])
 HEADER: Final = np.dtype([*PREAMBLE.descr, *RECORDS[HandsMessage], ("latency_ms", LATENCY)], align=True)
+_TIMECODE: Final = np.dtype([("timecode", NAME), ("timecode_rate", "<f4"), ("reserved", "V4")])
+TIMED_HEADER: Final = np.dtype(
+    {
+        "names": [*(HEADER.names or ()), *(_TIMECODE.names or ())],
+        "formats": [kind for part in (HEADER, _TIMECODE) for kind, *_ in (part.fields or {}).values()],
+        "offsets": [
+            start + offset
+            for start, part in ((0, HEADER), (HEADER.itemsize, _TIMECODE))
+            for _, offset, *_ in (part.fields or {}).values()
+        ],
+        "itemsize": HEADER.itemsize + _TIMECODE.itemsize,
+    }
+)
+"""The header of a message that has a timecode. A rate of zero means that it is not known."""
 HAND: Final = np.dtype([("side", "u1"), ("has_object", "u1"), *RECORDS[HandPose]], align=True)
 BODY: Final = np.dtype(RECORDS[BodyPose], align=True)

@@ -32,6 +32,8 @@ def encode_msgpack(message: HandsMessage, checked: bool = False) -> bytes:
             "hands": {side: _hand_map(hand) for side, hand in message.hands.items()},
             "bodies": [_body_map(body) for body in message.bodies],
             "latency_ms": {f.name: float(getattr(message.latency_ms, f.name)) for f in fields(Latency)},
+            "timecode": message.timecode,
+            "timecode_rate": None if message.timecode_rate is None else float(message.timecode_rate),
         }
     )
     assert payload is not None  # only None when msgpack streams into a buffer
@@ -60,6 +62,8 @@ def decode_msgpack(payload: bytes) -> HandsMessage:
         hands={known_side(side): _hand_value(hand, f"hands.{side}") for side, hand in hands.items()},
         bodies=tuple(_body_value(b, f"bodies[{i}]") for i, b in enumerate(_get(top, "bodies", list))),
         latency_ms=Latency(*(_number(latency, f.name, "latency_ms.") for f in fields(Latency))),
+        timecode=None if top.get("timecode") is None else _get(top, "timecode", str),
+        timecode_rate=None if top.get("timecode_rate") is None else _number(top, "timecode_rate"),
     )
     check(message)
     return message

@@ -15,6 +15,7 @@ from manipnet.wire.hands import (
     HandsMessage,
     Latency,
 )
+from manipnet.wire.timecode import MAX_RATE, is_rate, is_timecode
 
 
 def check(message: HandsMessage) -> None:
@@ -28,6 +29,12 @@ def check(message: HandsMessage) -> None:
     _check_floats(np.array(numbers), (3,), "t_capture, t_publish, look_ahead")
     latency = [getattr(message.latency_ms, f.name) for f in fields(Latency)]
     _check_floats(np.array(latency), (len(latency),), "latency_ms")
+    if message.timecode is not None and not is_timecode(message.timecode):
+        raise MessageError(
+            f"timecode is {message.timecode!r:.40}; it must be HH:MM:SS:FF, or HH:MM:SS;FF for drop frame"
+        )
+    if message.timecode_rate is not None and not is_rate(message.timecode_rate):
+        raise MessageError(f"timecode_rate is {message.timecode_rate}; it must be above 0 and at most {MAX_RATE:g}")
     for side, hand in message.hands.items():
         _check_hand(hand, f"hands.{known_side(side)}")
     for i, body in enumerate(message.bodies):

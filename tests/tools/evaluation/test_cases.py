@@ -53,7 +53,7 @@ def test_the_synthesis_receives_no_captured_fingers(cases):
 
 
 def test_a_folder_that_is_not_the_dataset_is_refused(tmp_path, manipnet_data):
-    with pytest.raises(DataError, match="holds no takes; expected are folders BVH"):
+    with pytest.raises(DataError, match="contains no takes; it must have folders BVH"):
         load_cases(tmp_path)
     with pytest.raises(DataError, match="has no take spoon9; it has"):
         load_cases(manipnet_data, ("spoon9",))

@@ -24,7 +24,6 @@ from manipnet.config.settings import (
     input_options,
     server_config,
 )
-from manipnet.control.client import ControlClient
 from manipnet.control.request import RequestError
 from manipnet.inputs import make_receivers
 from manipnet.inputs.declaration import Input
@@ -144,6 +143,8 @@ def expected_parts(actors: Sequence[ActorConfig]) -> dict[str, BodyKey]:
 
 def ask_status(host: str, port: int, key: Path | None = None) -> dict[str, Any] | None:
     """The `status` of the server that runs there, or None if none answers. Raises `KeyFileError`."""
+    from manipnet.control.client import ControlClient  # loads ZeroMQ, for which a wrong option does not wait
+
     address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     try:
         answer = ControlClient(address, key, ANSWER_S).ask("status")

@@ -8,7 +8,6 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import load_cases
@@ -22,10 +21,8 @@ from manipnet_tools.terminal import open_console
 def run(options: EvaluateOptions) -> None:
     """Evaluate, print the tables and write the requested files.
 
-    Raises `DataError`, `TakeError`, `MeshError`, `BundleError` and `UnknownSolverError`.
+    Raises `DataError`, `TakeError`, `MeshError` and `BundleError`.
     """
-    for solver in options.solver:
-        solver_named(solver)
     console = open_console(stderr=False)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:

@@ -4,7 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
+from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.commands.checks import require_folder_of
+from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.training.config import TrainConfig
 
 EvaluationProtocol = Literal["seen", "unseen"]
@@ -43,6 +47,16 @@ class EvaluateOptions:
     plots: Path | None = None
     """Write plots and pictures of the worst frames into this folder."""
 
+    def check(self) -> None:
+        """Raise `DataError`, `BundleError`, `UnknownSolverError` or `ConfigError` for values that cannot be used."""
+        take_folders(self.data, self.takes)
+        for solver in self.solver:
+            solver_named(solver)
+        if self.protocol == "seen" or self.sweep:
+            for model in self.model:
+                find_bundle(model)
+        require_folder_of(self.json, "--json")
+
 
 @dataclass(frozen=True)
 class AblateOptions:
@@ -55,3 +69,7 @@ class AblateOptions:
     protocol: tuple[EvaluationProtocol, ...] = PROTOCOLS
     """Protocols to test on."""
     training: TrainConfig = ABLATION_TRAINING
+
+    def check(self) -> None:
+        """Raise `DataError` for a folder without takes."""
+        take_folders(self.data)

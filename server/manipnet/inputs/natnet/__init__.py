@@ -7,7 +7,7 @@ from manipnet.inputs.natnet.options import NatNetOptions
 def _open(options: NatNetOptions, reception: Reception) -> Receiver:
     from manipnet.inputs.natnet.client import NatNetBodies
 
-    return NatNetBodies(reception.intake, options, reception.allow)
+    return NatNetBodies(reception.intake, options, reception.allow, reception.bodies)
 
 
 NATNET = Input(

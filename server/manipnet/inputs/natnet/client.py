@@ -4,13 +4,16 @@ import functools
 import logging
 import socket
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from manipnet.common.options import Network
 from manipnet.inputs.base import Intake
 from manipnet.inputs.declaration import Receiver
-from manipnet.inputs.natnet.frames import MocapFrame, RigidBody, read_body_names, read_frame
+from manipnet.inputs.natnet.definitions import read_definitions
+from manipnet.inputs.natnet.frames import MocapFrame, RigidBody, read_frame
+from manipnet.inputs.natnet.names import Names
 from manipnet.inputs.natnet.options import NatNetOptions
 from manipnet.inputs.natnet.protocol import (
     MULTICAST_GROUP,
@@ -23,6 +26,8 @@ from manipnet.inputs.natnet.protocol import (
     read_server_info,
     write_packet,
 )
+from manipnet.inputs.natnet.timecode_rate import TimecodeRate
+from manipnet.inputs.sender_clock import SenderClock
 from manipnet.net.addresses import AllowList
 from manipnet.net.clock_offset import ClockProbes
 from manipnet.net.errors import ListenError
@@ -30,7 +35,7 @@ from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import Address, UdpThread, bind_udp, join_multicast, local_address_towards
 from manipnet.telemetry import Gauge
-from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, make_sample
+from manipnet.wire.bodies import CONFLICT, MAX_BODIES, BodyFrame, BodySample, MessageError, make_sample
 
 CONNECT_S = 1.0
 """How often the client asks a server that sends no frames to connect."""
@@ -39,6 +44,7 @@ ECHO_S = 1.0
 SILENT_S = 3.0
 """A server that has sent nothing for this long counts as gone, and is asked to connect again."""
 CHORES_S = 0.1
+MOST_REPORTED = 64
 
 STATES = ("connecting", "connected", "streaming", "silent")
 _STREAMS_MULTICAST = (
@@ -55,7 +61,14 @@ class NatNetBodies(Receiver):
     cards. Without an interface in `options`, the system's choice towards the server is taken.
     """
 
-    def __init__(self, intake: Intake, options: NatNetOptions, allow: Sequence[Network] = ()) -> None:
+    def __init__(
+        self,
+        intake: Intake,
+        options: NatNetOptions,
+        allow: Sequence[Network] = (),
+        bodies: frozenset[int | str] = frozenset(),
+    ) -> None:
+        """`bodies` are those of the rig, which help with names that are not written in UTF-8."""
         assert options.natnet is not None
         self._intake = intake
         self._rate_limiter, self._allowed = SourceRateLimiter(), AllowList(allow)
@@ -65,8 +78,14 @@ class NatNetBodies(Receiver):
         self._command: UdpThread | None = None
         self._data: UdpThread | None = None
         self._info: ServerInfo | None = None
-        self._names: Mapping[int, str] = {}
-        self._names_wanted = True
+        self._names, self._expected = Names(), bodies
+        self._twice: tuple[int, ...] = ()
+        """The streaming ids that occurred twice in the newest frame."""
+        self._timecode_rate = TimecodeRate()
+        self._sender_clock = SenderClock(("time stamp",))
+        self._unused: Mapping[str, int] = {}
+        self._nameless_bones = self._bones_left_out = 0
+        self._reported: set[str] = set()
         self._clock = ClockProbes()
         self._stamps_ahead_s: float | None = None
         self._heard_s = self._framed_s = float("-inf")
@@ -107,8 +126,10 @@ class NatNetBodies(Receiver):
             self._data = None
 
     def status(self) -> dict[str, Any]:
-        """The state, the server, the names of its bodies, what is wrong, and two offsets from this machine's clock.
+        """The state, the server, what it streams, what is wrong, and two offsets from this machine's clock.
 
+        `unused` is what is in the frames beside rigid bodies and bones, and `conflicts` says which names or ids are
+        ambiguous.
         `clock_offset_s` is the offset of the server's clock, and `capture_offset_s` that of the frames' times, which
         are those of the exposure.
         """
@@ -117,12 +138,20 @@ class NatNetBodies(Receiver):
         return {
             "state": self._state(now_s),
             "server": None if info is None else f"{info.application}, NatNet {info.version[0]}.{info.version[1]}",
-            "bodies": {str(id): name for id, name in self._names.items()},
+            "bodies": {str(id): name for id, name in self._names.definitions.bodies},
+            "bones": list(self._names.definitions.bones.values()),
+            "unused": self._unused_now(),
+            "conflicts": self._conflicts(),
+            "clock": self._sender_clock.report(),
             "clock_offset_s": None if offset is None else offset.offset_s,
             "clock_uncertainty_s": None if offset is None else offset.uncertainty_s,
             "capture_offset_s": None if offset is None or ahead_s is None else offset.offset_s + ahead_s,
             "problem": self._problem,
         }
+
+    def _unused_now(self) -> dict[str, int]:
+        bones = {"bones without a name": self._nameless_bones, "bones beyond the limit": self._bones_left_out}
+        return {**self._unused, **{what: count for what, count in bones.items() if count}}
 
     def gauges(self) -> Iterator[Gauge]:
         """The state and the clock offsets."""
@@ -147,7 +176,7 @@ class NatNetBodies(Receiver):
             self._send(MessageId.CONNECT, connect_payload("ManipNet Live"))
         if self._info is None:
             return CHORES_S
-        if self._names_wanted and self._is_due("names", now_s, CONNECT_S):
+        if self._names.should_ask(now_s, CONNECT_S):
             self._send(MessageId.MODEL_REQUEST)
         if not self._multicast and self._is_due("keep alive", now_s, KEEP_ALIVE_S):
             self._send(MessageId.KEEP_ALIVE)
@@ -200,8 +229,8 @@ class NatNetBodies(Receiver):
             case MessageId.SERVER_INFO:
                 self._take_server_info(read_server_info(payload), now_s)
             case MessageId.MODEL_DEFINITIONS if self._info is not None:
-                self._names = read_body_names(payload, self._info.version)
-                self._names_wanted = False
+                self._names.define(read_definitions(payload, self._info.version, self._expected))
+                self._report_conflicts()
             case MessageId.ECHO_RESPONSE if self._info is not None:
                 stamp, ticks = read_echo(payload)
                 if stamp == self._echo_stamp and self._info.clock_hz:
@@ -220,7 +249,8 @@ class NatNetBodies(Receiver):
         if info != self._info or now_s - self._heard_s > SILENT_S:
             self._clock.clear()
             self._stamps_ahead_s = None
-        self._info, self._names_wanted = info, True
+        self._info = info
+        self._names.forget()
         self._report(self._listen_to(info))
 
     def _listen_to(self, info: ServerInfo) -> str | None:
@@ -241,25 +271,69 @@ class NatNetBodies(Receiver):
 
     def _take_frame(self, payload: bytes, source: str, now_s: float) -> None:
         if self._info is None:
-            self._intake.drop("unsupported", source, "a frame arrived before the server had told its version")
+            self._intake.drop("unsupported", source, "a frame arrived before the server had sent its version")
             return
         frame = read_frame(payload, self._info.version)
         if frame.exposed_ticks and self._info.clock_hz:
             self._stamps_ahead_s = frame.timestamp_s - frame.exposed_ticks / self._info.clock_hz
-        self._names_wanted = self._names_wanted or frame.models_changed
+        self._names.note(frame)
         self._framed_s = now_s
+        self._unused = frame.unused
         self._problem = None
         self._intake.accept(self._body_frame(frame, source, now_s))
 
     def _body_frame(self, frame: MocapFrame, source: str, now_s: float) -> BodyFrame:
-        bodies = {body.id: self._sample(body) for body in frame.bodies}
-        return BodyFrame(frame.timestamp_s, frame.number, tuple(bodies.values()), now_s, source)
+        names = self._names.bodies
+        samples = [self._sample(body, body.id, names.get(body.id)) for body in frame.bodies]
+        self._refuse_twice(samples)
+        if frame.skeletons:
+            bones = list(self._names.bones(frame))
+            self._nameless_bones = sum(len(each.bones) for each in frame.skeletons) - len(bones)
+            room = MAX_BODIES - len(samples)
+            self._bones_left_out = max(len(bones) - room, 0)
+            samples += [self._sample(bone, None, name) for name, bone in bones[:room]]
+        self._sender_clock.clocks[0].note(frame.timestamp_s, now_s)
+        t_s = self._sender_clock.choose((frame.timestamp_s,), now_s, repeats=False)
+        timecode = frame.timecode
+        rate = None if timecode is None else self._timecode_rate.note(timecode)
+        assert t_s is not None  # every frame has a time stamp
+        return BodyFrame(t_s, frame.number, tuple(samples), now_s, source, timecode, rate)
 
-    def _sample(self, body: RigidBody) -> BodySample:
+    def _refuse_twice(self, samples: list[BodySample]) -> None:
+        """Two bodies with one streaming id are lost, since nobody can tell which of them is meant."""
+        if len({sample.id for sample in samples}) == len(samples):
+            self._twice = ()
+            return
+        counts = Counter(sample.id for sample in samples)
+        twice = tuple(id for id, count in counts.items() if count > 1 and id is not None)
+        for id in twice:
+            lost = BodySample(id, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), False, CONFLICT)
+            samples[:] = [sample for sample in samples if sample.id != id] + [lost]
+        if twice != self._twice:
+            self._twice = twice
+            self._report_conflicts()
+
+    def _conflicts(self) -> list[str]:
+        """Which ids and names are ambiguous, in the definitions or, if these do not tell, in the frames."""
+        defined = Counter(id for id, _ in self._names.definitions.bodies)
+        unexplained = [
+            f"the streaming id {id} occurs twice in each frame, so neither body is used; give each its own id in Motive"
+            for id in self._twice
+            if defined[id] < 2
+        ]
+        return [*self._names.conflicts, *unexplained]
+
+    def _report_conflicts(self) -> None:
+        for text in self._conflicts():
+            if text not in self._reported and len(self._reported) < MOST_REPORTED:
+                self._reported.add(text)
+                _log.warning("NatNet: %s", text)
+
+    def _sample(self, body: RigidBody, id: int | None, name: str | None) -> BodySample:
         (x, y, z), (qx, qy, qz, qw) = body.p, body.q
         if self._up == "z":  # turn by -90 degrees about x: z becomes y, y becomes -z
             (x, y, z), (qx, qy, qz) = (x, z, -y), (qx, qz, -qy)
-        return make_sample(body.id, self._names.get(body.id), (x, y, z), (qx, qy, qz, qw), body.tracked)
+        return make_sample(id, name, (x, y, z), (qx, qy, qz, qw), body.tracked)
 
     def _report(self, problem: str | None) -> None:
         """Log a problem once. The problem is assigned in one step, so that it does not flicker in the status."""

@@ -1,23 +1,35 @@
-"""Reads NatNet frames and model definitions of the versions 3.0 to 4.5, as pure functions on bytes.
+"""Reads NatNet frames of the versions 2.7 to 4.5, as pure functions on bytes.
 
-What rigid bodies do not need (markers, skeletons, assets, force plates, devices) is skipped: from 4.1 on by the byte
-size that follows each count, and before by its layout. The readers raise `MessageError` and nothing else.
+What is not used (markers, assets, force plates, devices) is counted and skipped: from 4.1 on by the byte size that
+follows each count, and before by its layout. Before 3.0, each body is followed by its markers. Sources: PacketClient
+and the Python client of the NatNet SDK, whose readers name the version of each field. `read_frame` raises
+`MessageError` and nothing else.
 """
 
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Final
 
-from manipnet.inputs.natnet.protocol import Version, printable
+from manipnet.inputs.natnet.cursor import Cursor
+from manipnet.inputs.natnet.protocol import Version
 from manipnet.wire.bodies import MAX_BODIES, MAX_TIME_S, MessageError
+from manipnet.wire.timecode import timecode_text
 
-_SIZED: Version = (4, 1)
-_MAX_PARTS = 1_024
-"""Parts of variable length that one packet may have, so that no packet takes long to read."""
+SIZED: Final[Version] = (4, 1)
+"""From this version on, the size in bytes follows each count."""
+MODERN: Final[Version] = (3, 0)
+"""From this version on, frames have clock stamps, and the markers of bodies are only in the definitions."""
+
 _BODY = struct.Struct("<i3f4ffh")
+_POSE_ONLY = struct.Struct("<i3f4f")
+_QUALITY = struct.Struct("<fh")
+_SUFFIX_2 = struct.Struct("<fIIdH")
 _SUFFIX_3 = struct.Struct("<IId3QH")
 _SUFFIX_4 = struct.Struct("<IId3Q2IH")
-_VECTOR, _LABELLED_MARKER, _CAMERA_POSE = 12, 26, 28
+_VECTOR = 12
+_MARKER = 20
+"""Position, id and size of a marker of a body, before 3.0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +41,14 @@ class RigidBody:
     q: tuple[float, float, float, float]
     mean_error: float
     tracked: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """The bones of one skeleton. Their ids count within the skeleton."""
+
+    id: int
+    bones: tuple[RigidBody, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,112 +64,62 @@ class MocapFrame:
     recording: bool
     models_changed: bool
     live: bool
+    skeletons: tuple[Skeleton, ...] = ()
+    timecode: str | None = None
+    """HH:MM:SS:FF, or None if there is none."""
+    unused: dict[str, int] = field(default_factory=dict)
+    """What else is in the frame, and how often."""
 
 
 def read_frame(payload: bytes, version: Version) -> MocapFrame:
     """Read the payload of a frame packet of the given version."""
-    cursor = _Cursor(payload)
-    sized = version >= _SIZED
+    cursor = Cursor(payload)
+    sized, has_markers = version >= SIZED, version < MODERN
+    unused: dict[str, int] = {}
     number = cursor.int32()
-    _skip_elements(cursor, sized, _marker_set)
-    _skip_elements(cursor, sized, lambda c: c.skip(_VECTOR))  # other markers
-    bodies = _read_bodies(cursor, sized)
-    _skip_elements(cursor, sized, _skeleton)
+    _skip(cursor, sized, _marker_set)
+    _skip(cursor, sized, lambda c: c.skip(_VECTOR), "unlabelled markers", unused)
+    bodies = _read_bodies(cursor, sized, has_markers)
+    skeletons = _read_skeletons(cursor, sized, has_markers)
     if sized:
-        _skip_elements(cursor, sized, _nothing)  # assets, new in 4.1
-    _skip_elements(cursor, sized, lambda c: c.skip(_LABELLED_MARKER))
-    _skip_elements(cursor, sized, _analog)  # force plates
-    _skip_elements(cursor, sized, _analog)  # devices
-    suffix = cursor.unpack(_SUFFIX_4 if version >= (4, 0) else _SUFFIX_3)
-    timestamp_s, flags = suffix[2], suffix[-1]
+        _skip(cursor, sized, _nothing, "assets", unused)  # new in 4.1
+    _skip(cursor, sized, lambda c: c.skip(22 if has_markers else 26), "labelled markers", unused)
+    if version >= (2, 9):
+        _skip(cursor, sized, _analog, "force plates", unused)
+    if version >= (2, 11):
+        _skip(cursor, sized, _analog, "devices", unused)
+    timecode, timestamp_s, stamps, flags = _read_suffix(cursor, version)
     if not abs(timestamp_s) <= MAX_TIME_S:
         raise MessageError(f"NatNet frame {number} has the time {timestamp_s}; it must be finite, in seconds")
     return MocapFrame(
         number,
         bodies,
         timestamp_s,
-        *suffix[3:6],
+        *stamps,
         recording=bool(flags & 1),
         models_changed=bool(flags & 2),
         live=bool(flags & 4),
+        skeletons=skeletons,
+        timecode=timecode_text(timecode),
+        unused=unused,
     )
 
 
-def read_body_names(payload: bytes, version: Version) -> dict[int, str]:
-    """Read the payload of model definitions: the names of the rigid bodies by streaming id."""
-    cursor = _Cursor(payload)
-    names: dict[int, str] = {}
-    for _ in range(cursor.count()):
-        cursor.part()
-        kind = cursor.int32()
-        if version >= _SIZED:
-            definition = cursor.section()
-            if kind == 1:
-                _name_body(definition, names)
-        elif kind in _DEFINITIONS:
-            _DEFINITIONS[kind](cursor, version, names)
-        else:
-            break  # its length is unknown, so what follows cannot be found
-    return names
+def _read_suffix(cursor: Cursor, version: Version) -> tuple[int, float, tuple[int, int, int], int]:
+    """Timecode, time stamp, the three stamps of the clock (zero before 3.0), and flags."""
+    if version < MODERN:
+        _, timecode, _, timestamp_s, flags = cursor.unpack(_SUFFIX_2)
+        return timecode, timestamp_s, (0, 0, 0), flags
+    suffix = cursor.unpack(_SUFFIX_4 if version >= (4, 0) else _SUFFIX_3)
+    return suffix[0], suffix[2], suffix[3:6], suffix[-1]
 
 
-class _Cursor:
-    """A position in one payload. It stays within the payload and limits the number of parts."""
-
-    def __init__(self, payload: bytes) -> None:
-        self._data = payload
-        self._offset = 0
-        self._parts = 0
-
-    def skip(self, size: int) -> None:
-        if size > self.left():
-            raise MessageError(f"a NatNet payload ends at byte {len(self._data)}, where {size} more are needed")
-        self._offset += size
-
-    def part(self) -> None:
-        self._parts += 1
-        if self._parts > _MAX_PARTS:
-            raise MessageError(f"a NatNet payload has more than {_MAX_PARTS} parts")
-
-    def unpack(self, layout: struct.Struct) -> tuple:
-        start = self._offset
-        self.skip(layout.size)
-        return layout.unpack_from(self._data, start)
-
-    def int32(self) -> int:
-        start = self._offset
-        self.skip(4)
-        return int.from_bytes(self._data[start : start + 4], "little", signed=True)
-
-    def count(self) -> int:
-        count = self.int32()
-        if not 0 <= count <= len(self._data):
-            raise MessageError(f"a NatNet payload of {len(self._data)} bytes announces {count} elements")
-        return count
-
-    def text(self) -> bytes:
-        start = self._offset
-        end = self._data.find(b"\0", start)
-        if end < 0:
-            raise MessageError(f"a NatNet text at byte {start} has no end")
-        self._offset = end + 1
-        return self._data[start:end]
-
-    def left(self) -> int:
-        return len(self._data) - self._offset
-
-    def section(self) -> "_Cursor":
-        """A cursor over the section whose byte size comes next. This cursor moves behind the section."""
-        size = self.int32()
-        if not 0 <= size <= self.left():
-            raise MessageError(f"a NatNet section announces {size} bytes, but {self.left()} are left")
-        start = self._offset
-        self.skip(size)
-        return _Cursor(self._data[start : start + size])
-
-
-def _skip_elements(cursor: _Cursor, sized: bool, element: Callable[[_Cursor], None]) -> None:
+def _skip(
+    cursor: Cursor, sized: bool, element: Callable[[Cursor], None], name: str = "", unused: dict[str, int] | None = None
+) -> None:
     count = cursor.count()
+    if count and unused is not None:
+        unused[name] = count
     if sized:
         cursor.section()
         return
@@ -158,7 +128,7 @@ def _skip_elements(cursor: _Cursor, sized: bool, element: Callable[[_Cursor], No
         element(cursor)
 
 
-def _read_bodies(cursor: _Cursor, sized: bool) -> tuple[RigidBody, ...]:
+def _read_bodies(cursor: Cursor, sized: bool, has_markers: bool) -> tuple[RigidBody, ...]:
     count = cursor.count()
     if count > MAX_BODIES:
         raise MessageError(f"a NatNet frame has {count} rigid bodies; at most {MAX_BODIES} are allowed")
@@ -168,101 +138,49 @@ def _read_bodies(cursor: _Cursor, sized: bool) -> tuple[RigidBody, ...]:
         extra = cursor.left() // count - _BODY.size if count else 0
         if extra < 0:
             raise MessageError(f"a NatNet section of {cursor.left()} bytes announces {count} rigid bodies")
-    bodies = []
-    for _ in range(count):
+    return tuple([_read_body(cursor, has_markers, extra) for _ in range(count)])
+
+
+def _read_body(cursor: Cursor, has_markers: bool, extra: int = 0) -> RigidBody:
+    if has_markers:
+        id, px, py, pz, qx, qy, qz, qw = cursor.unpack(_POSE_ONLY)
+        cursor.part()
+        cursor.skip(_MARKER * cursor.count())
+        mean_error, params = cursor.unpack(_QUALITY)
+    else:
         id, px, py, pz, qx, qy, qz, qw, mean_error, params = cursor.unpack(_BODY)
         cursor.skip(extra)
-        bodies.append(RigidBody(id, (px, py, pz), (qx, qy, qz, qw), mean_error, bool(params & 1)))
-    return tuple(bodies)
+    return RigidBody(id, (px, py, pz), (qx, qy, qz, qw), mean_error, bool(params & 1))
 
 
-def _nothing(cursor: _Cursor) -> None:
+def _read_skeletons(cursor: Cursor, sized: bool, has_markers: bool) -> tuple[Skeleton, ...]:
+    count = cursor.count()
+    if sized:
+        cursor = cursor.section()
+    skeletons, bones_left = [], MAX_BODIES
+    for _ in range(count):
+        cursor.part()
+        id, bones = cursor.int32(), cursor.count()
+        if bones > bones_left:
+            if sized:
+                break  # the rest is skipped with its section
+            raise MessageError(f"a NatNet frame has more than {MAX_BODIES} bones")
+        bones_left -= bones
+        skeletons.append(Skeleton(id, tuple([_read_body(cursor, has_markers) for _ in range(bones)])))
+    return tuple(skeletons)
+
+
+def _nothing(cursor: Cursor) -> None:
     pass
 
 
-def _marker_set(cursor: _Cursor) -> None:
+def _marker_set(cursor: Cursor) -> None:
     cursor.text()
     cursor.skip(_VECTOR * cursor.count())
 
 
-def _skeleton(cursor: _Cursor) -> None:
-    cursor.skip(4)
-    cursor.skip(_BODY.size * cursor.count())
-
-
-def _analog(cursor: _Cursor) -> None:
+def _analog(cursor: Cursor) -> None:
     cursor.skip(4)
     for _ in range(cursor.count()):
         cursor.part()
         cursor.skip(4 * cursor.count())
-
-
-def _texts(cursor: _Cursor) -> None:
-    for _ in range(cursor.count()):
-        cursor.part()
-        cursor.text()
-
-
-def _name_body(cursor: _Cursor, names: dict[int, str]) -> None:
-    name, id = printable(cursor.text()), cursor.int32()
-    if name is not None:
-        names[id] = name
-
-
-def _define_markers(cursor: _Cursor, version: Version, names: dict[int, str]) -> None:
-    cursor.text()
-    _texts(cursor)
-
-
-def _define_body(cursor: _Cursor, version: Version, names: dict[int, str]) -> None:
-    _name_body(cursor, names)
-    cursor.skip(4 + _VECTOR)  # parent and offset
-    count = cursor.count()
-    cursor.skip((_VECTOR + 4) * count)  # marker offsets and labels
-    if version >= (4, 0):
-        for _ in range(count):
-            cursor.part()
-            cursor.text()
-
-
-def _define_skeleton(cursor: _Cursor, version: Version, names: dict[int, str]) -> None:
-    cursor.text()
-    cursor.skip(4)
-    for _ in range(cursor.count()):
-        cursor.part()
-        _define_body(cursor, version, {})  # bones have ids of their own
-
-
-def _define_force_plate(cursor: _Cursor, version: Version, names: dict[int, str]) -> None:
-    cursor.skip(4)
-    cursor.text()
-    cursor.skip(4 * (2 + 3 + 12 * 12 + 4 * 3 + 2))  # size, origin, calibration, corners, two types
-    _texts(cursor)
-
-
-def _define_device(cursor: _Cursor, version: Version, names: dict[int, str]) -> None:
-    cursor.skip(4)
-    cursor.text()
-    cursor.text()
-    cursor.skip(8)
-    _texts(cursor)
-
-
-def _define_camera(cursor: _Cursor, version: Version, names: dict[int, str]) -> None:
-    cursor.text()
-    cursor.skip(_CAMERA_POSE)
-
-
-_DEFINITIONS = dict(
-    enumerate(
-        [
-            _define_markers,
-            _define_body,
-            _define_skeleton,
-            _define_force_plate,
-            _define_device,
-            _define_camera,
-        ]
-    )
-)
-"""The reader of each kind of definition, for the versions without byte sizes."""

@@ -5,14 +5,16 @@ A packet consists of a message id and a payload size (uint16 each), then the pay
 """
 
 import struct
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import IntEnum
 
 from manipnet.wire.bodies import MAX_NAME_CHARS, MessageError
+from manipnet.wire.text import read_text
 
 Version = tuple[int, int]
 
-OLDEST: Version = (3, 0)
+OLDEST: Version = (2, 7)
 NEWEST: Version = (4, 5)
 DATA_PORT = 1511
 MULTICAST_GROUP = "239.255.42.99"
@@ -96,7 +98,7 @@ def check_version(version: Version) -> None:
     if not OLDEST <= version < (NEWEST[0] + 1, 0):
         raise MessageError(
             f"the server speaks NatNet {version[0]}.{version[1]}, and this program understands "
-            f"{OLDEST[0]}.{OLDEST[1]} (Motive 2.0) to {NEWEST[0]}.{NEWEST[1]}; update Motive, or this program"
+            f"{OLDEST[0]}.{OLDEST[1]} (Motive 1) to {NEWEST[0]}.{NEWEST[1]}; update Motive, or this program"
         )
 
 
@@ -107,7 +109,10 @@ def read_echo(payload: bytes) -> tuple[int, int]:
     return struct.unpack_from("<QQ", payload)
 
 
-def printable(text: bytes) -> str | None:
-    """A name in a packet, or None if it is empty, too long or not printable, and so cannot be logged or matched."""
-    name = text.decode("utf-8", errors="replace")
+def printable(text: bytes, expected: Collection[object] = ()) -> str | None:
+    """A name in a packet, or None if it is empty, too long or not printable, and so cannot be logged or matched.
+
+    `expected` names help to read a name that is not written in UTF-8.
+    """
+    name = read_text(text[: 4 * MAX_NAME_CHARS], expected)
     return name if 0 < len(name) <= MAX_NAME_CHARS and name.isprintable() else None

@@ -1,32 +1,61 @@
 """Assembles the OSC messages of one sender into frames, each of which holds the messages of one instant."""
 
+from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, field
+from typing import Final, NamedTuple
 
-from manipnet.inputs.osc.addresses import BodyKey, Numbers, Route, read_route
-from manipnet.inputs.osc.packet import IMMEDIATELY, time_tag_to_s
-from manipnet.wire.bodies import MAX_BODIES, BodyFrame, BodySample, make_sample
+from manipnet.inputs.osc.addresses import AddressBook
+from manipnet.inputs.osc.memory import REFUSED, BodyMemory, Fields
+from manipnet.inputs.osc.packet import IMMEDIATELY, Packet, time_tag_to_s
+from manipnet.inputs.osc.reader import BodyKey, Route
+from manipnet.inputs.sender_clock import SenderClock
+from manipnet.wire.bodies import MAX_BODIES, BodyFrame, BodySample, MessageError
+from manipnet.wire.timecode import timecode_text
 
-GAP_S = 0.005
+GAP_S: Final = 0.005
 """Unmarked messages that arrive farther apart than this belong to different frames."""
-MARKED_GAP_S = 0.050
+MARKED_GAP_S: Final = 0.050
 """Timeout for a frame that was started but not ended."""
-CLOCK_PATIENCE = 60
+CLOCK_PATIENCE: Final = 15
 """After this many frames without a time stamp, a sender counts as one that sends none."""
-
-_ARRIVAL, _STAMP, _TAG = range(3)
+VMC_TIME_S: Final = 0.1
+"""How long a time of `/VMC/Ext/T` stands for frames that come without one."""
+CLOCKS: Final = ("time tag", "/frame/timestamp", "/VMC/Ext/T")
+"""The clocks of a sender, best first."""
+_POSES: Final = frozenset(("position", "quat", "transformation", "local"))
 
 
 @dataclass(slots=True)
 class _Pending:
     """The frame that is being assembled: the fields of each body, and its times."""
 
-    bodies: dict[BodyKey, dict[str, Numbers]] = field(default_factory=dict)
+    bodies: dict[BodyKey, Fields] = field(default_factory=dict)
     number: int | None = None
     stamp_s: float | None = None
+    vmc_s: float | None = None
     time_tag: int = IMMEDIATELY
+    timecode: str | None = None
     marked: bool = False
     begun_s: float | None = None
     touched_s: float = 0.0
+
+
+@dataclass(slots=True)
+class _VmcTime:
+    """The newest time of `/VMC/Ext/T`, which may come in a datagram of its own, and the bodies that had this time."""
+
+    t_s: float | None = None
+    noted_s: float = 0.0
+    bodies: set[BodyKey] = field(default_factory=set)
+
+
+class Added(NamedTuple):
+    """What a datagram gave: the frames that it completes, whether it holds anything of use, and what was wrong."""
+
+    frames: list[BodyFrame]
+    useful: bool
+    faults: list[str]
 
 
 class FrameAssembler:
@@ -34,36 +63,52 @@ class FrameAssembler:
 
     A frame ends with `/frame/end`, at the end of its bundle, with a second value for a field that it already has, or
     after a gap. Between `/frame/start` and `/frame/end` it may extend over several datagrams and bundles. Its time is
-    the time tag of its bundle, or else `/frame/timestamp`, or else its arrival. Once a sender has given times, a frame
-    without one is dropped and counted in `incomplete`, since its arrival time would not fit between the others.
+    that of the first clock in `CLOCKS` that runs, or else its arrival. A frame that lacks the clock in use is dropped
+    and counted in `incomplete`, since its arrival time would not fit between the others.
     """
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, book: AddressBook | None = None) -> None:
         self.source = source
         self.incomplete = 0
+        self.heard_s = float("-inf")
+        """When the newest message of use arrived."""
+        self.clock = SenderClock(CLOCKS)
+        self._book = book or AddressBook()
+        self.memory = BodyMemory(self._book.bodies)
         self._pending = _Pending()
-        self._clock = _ARRIVAL
+        self._vmc = _VmcTime()
         self._without_clock = 0
+        self._bodies: tuple[BodySample, ...] = ()
 
     @property
     def pending(self) -> bool:
         """Whether a frame is being assembled."""
         return bool(self._pending.bodies)
 
-    def add(self, messages: list[tuple[int, bytes]], t_received_s: float) -> tuple[list[BodyFrame], bool]:
-        """The frames that one datagram completes, and whether any of its messages has a known address.
-
-        `messages` is what `split_packet` returned. Raises `MessageError` for a wrong message, and then ignores the
-        whole datagram.
-        """
-        routes = [(tag, route) for tag, message in messages if (route := read_route(message)) is not None]
+    def add(self, packet: Packet, t_received_s: float) -> Added:
+        """Take one datagram as `split_packet` returned it. A message that is wrong costs only itself."""
+        faults = packet.faults
+        routes: list[tuple[int, Route]] = []
+        for tag, message in packet.messages:
+            try:
+                route = self._book.read(message, self.source, t_received_s)
+            except MessageError as error:
+                faults.append(str(error))
+            else:
+                if route is not None:
+                    routes.append((tag, route))
         frames = self.flush(t_received_s)
+        if routes:
+            self.heard_s = t_received_s
+        refused = _same_keys(routes) if len(routes) > 2 else frozenset()
         for time_tag, route in routes:
             self._take(route, time_tag, t_received_s, frames)
+            if route.body in refused and route.body in self._pending.bodies:
+                self._pending.bodies[route.body][REFUSED] = True
         # Some senders wrap each message in a bundle of its own, so only a bundle of several messages ends a frame.
         if len(routes) > 1 and not self._pending.marked:
             self._close(frames)
-        return frames, bool(routes)
+        return Added(frames, bool(routes), faults)
 
     def flush(self, now_s: float) -> list[BodyFrame]:
         """The frame that is complete because nothing has arrived for a while, if there is one."""
@@ -73,26 +118,56 @@ class FrameAssembler:
             self._close(frames)
         return frames
 
-    def _take(self, route: Route, time_tag: int, t_received_s: float, frames: list[BodyFrame]) -> None:
+    def _take(self, route: Route, time_tag: int, now_s: float, frames: list[BodyFrame]) -> None:
         if self._begins_next_frame(route, time_tag):
             self._close(frames)
         pending = self._pending
-        pending.touched_s = t_received_s
-        pending.begun_s = t_received_s if pending.begun_s is None else pending.begun_s
-        if time_tag != IMMEDIATELY:
+        pending.touched_s = now_s
+        pending.begun_s = now_s if pending.begun_s is None else pending.begun_s
+        if time_tag > IMMEDIATELY and pending.time_tag != time_tag:
             pending.time_tag = time_tag
+            self._note_tag(time_tag, now_s)
         match route.field:
             case "start":
                 pending.number, pending.marked = int(route.values[0]), True
             case "end":
                 pending.number = int(route.values[0])
                 self._close(frames)
-            case "timestamp":
-                pending.stamp_s = route.values[0] / 1_000.0
-            case _ if route.body in pending.bodies or len(pending.bodies) < MAX_BODIES:
-                pending.bodies.setdefault(route.body, {})[route.field] = route.values
+            case "ms" | "s" | "smpte":
+                self._note_time(route, now_s)
+            case "name":
+                self.memory.name(route.body, route.text)
+            case "skeleton":
+                self._book.name_skeleton(route.body, route.text)
+            case _ if route.body in pending.bodies:
+                fields = pending.bodies[route.body]
+                # A datagram that arrives twice repeats its values; another value is that of another body.
+                if pending.marked and route.field in _POSES and fields.get(route.field, route.values) != route.values:
+                    fields[REFUSED] = True
+                add_to(fields, route)
+            case _ if len(pending.bodies) < MAX_BODIES:
+                fields = pending.bodies[route.body] = {}
+                add_to(fields, route)
             case _:
                 self.incomplete += 1
+
+    def _note_tag(self, time_tag: int, now_s: float) -> None:
+        clock = self.clock.clocks[0]
+        # Whole seconds, and times of the first hour of 1900, are rather numbers that only look like a time tag.
+        clock.doubtful = clock.runs is None and (time_tag & 0xFFFFFFFF == 0 or time_tag >> 32 == 0)
+        clock.note(time_tag_to_s(time_tag), now_s)
+
+    def _note_time(self, route: Route, now_s: float) -> None:
+        value, pending = route.values[0], self._pending
+        if route.field == "ms":
+            pending.stamp_s = value / 1_000.0
+            self.clock.clocks[1].note(pending.stamp_s, now_s)
+        elif route.field == "s":
+            pending.vmc_s = value
+            self._vmc = _VmcTime(value, now_s)
+            self.clock.clocks[2].note(value, now_s)
+        else:
+            pending.timecode = timecode_text(int(value))
 
     def _begins_next_frame(self, route: Route, time_tag: int) -> bool:
         """Whether a message cannot belong to the frame that is being assembled."""
@@ -103,42 +178,76 @@ class FrameAssembler:
             return False
         if pending.bodies and IMMEDIATELY not in (time_tag, pending.time_tag) and time_tag != pending.time_tag:
             return True
-        if route.field == "timestamp":
+        if route.field == "ms":
             return pending.stamp_s is not None
-        return route.field in pending.bodies.get(route.body, ())
+        if route.field == "s":
+            return pending.vmc_s is not None
+        fields = pending.bodies.get(route.body)
+        if fields is None or REFUSED in fields:
+            return False
+        return route.field in fields or any(part in fields for part in route.parts)
 
     def _close(self, frames: list[BodyFrame]) -> None:
         pending, self._pending = self._pending, _Pending()
-        samples = [_sample(key, fields) for key, fields in pending.bodies.items()]
-        bodies = tuple(sample for sample in samples if sample is not None)
+        if not pending.bodies:
+            if not pending.marked:  # a time without bodies is that of the bodies in the next datagram
+                self._pending.stamp_s = pending.stamp_s
+            return
+        bodies = self.memory.samples(pending.bodies, pending.touched_s)
         if not bodies:
             return
-        t_s = self._time(pending)
+        t_s = self._time(pending, bodies)
         if t_s is None:
             self.incomplete += 1
         else:
-            frames.append(BodyFrame(t_s, pending.number, bodies, pending.touched_s, self.source))
+            frames.append(
+                BodyFrame(t_s, pending.number, bodies, pending.touched_s, self.source, timecode=pending.timecode)
+            )
 
-    def _time(self, pending: _Pending) -> float | None:
-        times = {_ARRIVAL: pending.begun_s if pending.begun_s is not None else pending.touched_s}
-        if pending.stamp_s is not None:
-            times[_STAMP] = pending.stamp_s
-        if pending.time_tag != IMMEDIATELY:
-            times[_TAG] = time_tag_to_s(pending.time_tag)
-        best = max(times)
-        self._without_clock = self._without_clock + 1 if best < self._clock else 0
-        if best > self._clock or self._without_clock > CLOCK_PATIENCE:
-            self._clock, self._without_clock = best, 0
-        return times.get(self._clock)
+    def _time(self, pending: _Pending, bodies: tuple[BodySample, ...]) -> float | None:
+        tag_s = None if pending.time_tag <= IMMEDIATELY else time_tag_to_s(pending.time_tag)
+        vmc_s = self._vmc_s(pending)
+        arrived_s = pending.touched_s if pending.begun_s is None else pending.begun_s
+        repeats, self._bodies = bodies == self._bodies, bodies
+        t_s = self.clock.choose((tag_s, pending.stamp_s, vmc_s), arrived_s, repeats)
+        if t_s is not None:
+            self._without_clock = 0
+        else:
+            self._without_clock += 1
+            if self._without_clock > CLOCK_PATIENCE:
+                self.clock.forget()
+                t_s = self.clock.choose((tag_s, pending.stamp_s, vmc_s), arrived_s, repeats)
+        return t_s
+
+    def _vmc_s(self, pending: _Pending) -> float | None:
+        """The time of `/VMC/Ext/T` from an earlier datagram. It stands still if a body comes a second time with it."""
+        vmc = self._vmc
+        if vmc.t_s is None or pending.touched_s - vmc.noted_s > VMC_TIME_S:
+            return None
+        if not vmc.bodies.isdisjoint(pending.bodies):
+            self.clock.clocks[2].note(vmc.t_s, pending.touched_s)
+        vmc.bodies.update(pending.bodies)
+        return vmc.t_s
 
 
-def _sample(key: BodyKey, fields: dict[str, Numbers]) -> BodySample | None:
-    """The body with the given fields, or None if a part of its pose is missing."""
-    id, name = (key, None) if isinstance(key, int) else (None, key)
-    tracked = fields.get("tracked", (1.0,))[0] != 0.0
-    pose = fields.get("local") or fields.get("transformation")  # of the two in VMC, "local" is not scaled
-    if pose is None and "position" in fields and "quat" in fields:
-        pose = fields["position"] + fields["quat"]
-    if pose is None:
-        return None if tracked else make_sample(id, name, (0.0,) * 3, (0.0,) * 4, False)
-    return make_sample(id, name, pose[:3], pose[3:], tracked)
+def add_to(fields: Fields, route: Route) -> None:
+    """Add what a message says about a body to the fields of that body."""
+    if route.parts:
+        fields.update({part: (value,) for part, value in zip(route.parts, route.values, strict=True)})
+        fields["converter"] = route.converter
+    else:
+        fields[route.field] = route.values
+    if route.tracked is not None:
+        fields["tracked"] = (route.tracked,)
+
+
+def _same_keys(routes: list[tuple[int, Route]]) -> Collection[BodyKey]:
+    """The bodies that occur in one datagram with two different poses, while others occur once: they share a key.
+
+    If every body occurs as often as the others, the datagram holds several frames.
+    """
+    keys = [(route.body, route.field) for _, route in routes if route.field in _POSES]
+    if len(set(keys)) == len(keys) or min(Counter(keys).values()) > 1:
+        return frozenset()
+    values = {(route.body, route.field, route.values) for _, route in routes if route.field in _POSES}
+    return {body for (body, _), count in Counter((body, field) for body, field, _ in values).items() if count > 1}

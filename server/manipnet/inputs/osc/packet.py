@@ -5,11 +5,12 @@ stack on deep nesting, raises decoding errors and treats `*` in an address as a 
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection
 from functools import lru_cache
-from itertools import islice
+from typing import NamedTuple
 
 from manipnet.wire.bodies import MessageError
+from manipnet.wire.text import read_text
 
 MAX_DATAGRAM_BYTES = 24_576
 MAX_MESSAGES = 256
@@ -28,38 +29,54 @@ _NUMBERS = frozenset(b"ifhd")
 _PATTERN = frozenset("*?[]{}")
 
 
-def split_packet(data: bytes) -> list[tuple[int, bytes]]:
-    """`(time tag, message)` of each message in a datagram, in order. Raises `MessageError`.
+class Packet(NamedTuple):
+    """The messages of a datagram, each with its time tag, and what was wrong with the parts that were left out."""
 
-    A message has the time tag of the innermost bundle around it whose tag is not "immediately".
+    messages: list[tuple[int, bytes]]
+    faults: list[str]
+
+
+def split_packet(data: bytes) -> Packet:
+    """Split a datagram into its messages, in order. A part that is wrong costs only itself.
+
+    A message has the time tag of the innermost bundle around it whose tag is not "immediately". Raises `MessageError`
+    if there is no message in the datagram.
     """
     if not 4 <= len(data) <= MAX_DATAGRAM_BYTES:
         raise MessageError(f"the datagram has {len(data)} bytes; 4 to {MAX_DATAGRAM_BYTES} are allowed")
-    messages = list(islice(_elements(data, IMMEDIATELY, 0), MAX_MESSAGES + 1))
-    if len(messages) > MAX_MESSAGES:
-        raise MessageError(f"the bundle has more than {MAX_MESSAGES} messages")
-    return messages
+    packet = Packet([], [])
+    _split(data, IMMEDIATELY, 0, packet)
+    if packet.faults and not packet.messages:
+        raise MessageError(packet.faults[0])
+    return packet
 
 
-def _elements(data: bytes, time_tag: int, depth: int) -> Iterator[tuple[int, bytes]]:
-    if len(data) % 4:
-        raise MessageError(f"an OSC element has {len(data)} bytes; the length must be a multiple of 4")
-    if data[:1] == b"/":
-        yield time_tag, data
-        return
-    if data[:8] != _BUNDLE or len(data) < 16:
-        raise MessageError(f"an OSC element begins with {data[:8]!r}; it must be '/', or '#bundle' and a time tag")
-    if depth == MAX_DEPTH:
-        raise MessageError(f"bundles are nested deeper than {MAX_DEPTH}")
-    own_tag = int.from_bytes(data[8:16], "big")
+def _split(data: bytes, time_tag: int, depth: int, packet: Packet) -> None:
+    if data[:1] == b"/" and len(data) % 4 == 0:
+        packet.messages.append((time_tag, data))
+    elif data[:8] != _BUNDLE and len(data) % 4:
+        packet.faults.append(f"an OSC element has {len(data)} bytes; the length must be a multiple of 4")
+    elif data[:8] != _BUNDLE or len(data) < 16:
+        packet.faults.append(f"an OSC element begins with {data[:8]!r}; it must be '/', or '#bundle' and a time tag")
+    elif depth == MAX_DEPTH:
+        packet.faults.append(f"bundles are nested deeper than {MAX_DEPTH}")
+    else:
+        own_tag = int.from_bytes(data[8:16], "big")
+        _split_bundle(data, time_tag if own_tag == IMMEDIATELY else own_tag, depth, packet)
+
+
+def _split_bundle(data: bytes, time_tag: int, depth: int, packet: Packet) -> None:
     position = 16
     while position < len(data):
         size = int.from_bytes(data[position : position + 4], "big", signed=True)
         position += 4
-        if not 4 <= size <= len(data) - position:
-            raise MessageError(f"a bundle element has the size {size}, but {len(data) - position} bytes are left")
-        tag = time_tag if own_tag == IMMEDIATELY else own_tag
-        yield from _elements(data[position : position + size], tag, depth + 1)
+        if not 0 < size <= len(data) - position:
+            packet.faults.append(f"a bundle element has the size {size}, but {len(data) - position} bytes are left")
+            return
+        if len(packet.messages) + len(packet.faults) >= MAX_MESSAGES:
+            packet.faults.append(f"the bundle has more than {MAX_MESSAGES} messages")
+            return
+        _split(data[position : position + size], time_tag, depth + 1, packet)
         position += size
 
 
@@ -69,17 +86,20 @@ def read_address(message: bytes) -> tuple[bytes, int]:
     return message[:end], after
 
 
-def check_address(raw: bytes) -> str:
-    """The text of an address, if it is allowed. Raises `MessageError`."""
-    address = _decode(raw, "address")
+def check_address(raw: bytes, expected: Collection[object] = ()) -> str:
+    """The text of an address, if it is allowed; `expected` names help with other encodings. Raises `MessageError`."""
+    address = "/".join(read_text(part, expected) for part in raw.split(b"/"))
     if len(raw) > MAX_ADDRESS_BYTES or not address.isprintable() or not _PATTERN.isdisjoint(address):
         allowed = f"at most {MAX_ADDRESS_BYTES} printable characters without any of * ? [ ] {{ }}"
         raise MessageError(f"the OSC address is {address[:40]!r}; it must have {allowed}")
     return address
 
 
-def read_arguments(message: bytes, offset: int) -> tuple[Argument, ...]:
-    """The arguments from the offset that `read_address` returned. Raises `MessageError`."""
+def read_arguments(message: bytes, offset: int, expected: Collection[object] = ()) -> tuple[Argument, ...]:
+    """The arguments from the offset that `read_address` returned. Raises `MessageError`.
+
+    Text that is not UTF-8 is read in another encoding, if possible one that gives one of the `expected` names.
+    """
     if offset == len(message):
         return ()  # old senders omit the type tags of a message without arguments
     end, after = _text_end(message, offset, "type tag string")
@@ -87,7 +107,7 @@ def read_arguments(message: bytes, offset: int) -> tuple[Argument, ...]:
     layout = _numbers_layout(tags)
     if layout is not None and after + layout.size == len(message):
         return layout.unpack_from(message, after)
-    return _read_any(_decode(tags, "type tag string"), message, after)
+    return _read_any(tags.decode("latin-1"), message, after, expected)
 
 
 @lru_cache(maxsize=64)
@@ -98,7 +118,7 @@ def _numbers_layout(tags: bytes) -> struct.Struct | None:
     return struct.Struct(">" + "".join(_STRUCT_OF[tag] for tag in tags[1:].decode()))
 
 
-def _read_any(tags: str, message: bytes, offset: int) -> tuple[Argument, ...]:
+def _read_any(tags: str, message: bytes, offset: int, expected: Collection[object]) -> tuple[Argument, ...]:
     if not tags.startswith(",") or len(tags) > MAX_ARGUMENTS + 1:
         raise MessageError(f"OSC type tags are {tags[:20]!r}; they must be ',' and at most {MAX_ARGUMENTS} types")
     arguments: list[Argument] = []
@@ -111,7 +131,7 @@ def _read_any(tags: str, message: bytes, offset: int) -> tuple[Argument, ...]:
             offset += size
         elif tag in "sS":
             end, after = _text_end(message, offset, "text argument")
-            arguments.append(_decode(message[offset:end], "text argument"))
+            arguments.append(read_text(message[offset:end], expected))
             offset = after
         elif tag == "b":
             blob, offset = _read_blob(message, offset)
@@ -137,13 +157,6 @@ def _text_end(message: bytes, offset: int, what: str) -> tuple[int, int]:
     if end < 0 or after > len(message) or message[end:after].strip(b"\0"):
         raise MessageError(f"an OSC {what} does not end with one to four zero bytes")
     return end, after
-
-
-def _decode(text: bytes, what: str) -> str:
-    try:
-        return text.decode("utf-8")
-    except UnicodeDecodeError:
-        raise MessageError(f"an OSC {what} is not UTF-8 text") from None
 
 
 def _read_blob(message: bytes, offset: int) -> tuple[bytes, int]:

@@ -1,11 +1,15 @@
 """Receives OSC on a bound UDP socket with a thread of its own, and gathers each sender's messages into frames."""
 
+import logging
 import socket
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from manipnet.common.options import Network
 from manipnet.inputs.base import Intake
 from manipnet.inputs.declaration import Receiver
+from manipnet.inputs.osc.addresses import AddressBook
 from manipnet.inputs.osc.assembler import GAP_S, FrameAssembler
 from manipnet.inputs.osc.packet import split_packet
 from manipnet.net.addresses import AllowList
@@ -13,12 +17,18 @@ from manipnet.net.flood_filter import FloodFilter, FloodWatch
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import Address, UdpThread, bind_udp
+from manipnet.telemetry import LogThrottle
 from manipnet.wire.bodies import BodyFrame, MessageError
 
 MAX_SENDERS = 16
 DATAGRAMS_PER_S = 20_000
 """Datagrams read of one sender: a sender of loose messages needs three for each body."""
 IDLE_S = 0.1
+WORKING_S = 1.0
+"""A sender whose messages have been of use within this time may send others that are not."""
+REPORT_S, REPEAT_S = 2.0, 60.0
+"""How often the senders are looked at for something to report, and how often the same is reported again."""
+_log = logging.getLogger(__name__)
 _FLOOD = "more datagrams than are read, from one sender or from senders that are not known yet"
 
 
@@ -29,13 +39,21 @@ class OscBodies(Receiver):
     """
 
     def __init__(
-        self, intake: Intake, host: str = "127.0.0.1", port: int = 39540, allow: Sequence[Network] = ()
+        self,
+        intake: Intake,
+        host: str = "127.0.0.1",
+        port: int = 39540,
+        allow: Sequence[Network] = (),
+        book: AddressBook | None = None,
     ) -> None:
         self._intake = intake
+        self._book = book or AddressBook()
+        self._log_throttle = LogThrottle(REPEAT_S)
         self._rate_limiter = SourceRateLimiter(DATAGRAMS_PER_S)
         self._allowed = AllowList(allow or None)
         self._host, self._port = host, port
         self._assemblers: dict[Address, FrameAssembler] = {}
+        self._reported_s = float("-inf")
         self._thread: UdpThread | None = None
         self._flood: FloodWatch | None = None
         self.address = f"udp://{host}:{port}"
@@ -55,6 +73,21 @@ class OscBodies(Receiver):
             self._thread.stop()
             self._thread = None
 
+    def status(self) -> dict[str, Any]:
+        """What each sender's times and bodies are like, and which addresses arrive but are not understood."""
+        return {
+            "senders": {
+                assembler.source: {
+                    "clock": assembler.clock.report(),
+                    "sends_changes_only": assembler.memory.sends_changes_only,
+                    "halves": assembler.memory.halves(),
+                    "conflicts": assembler.memory.conflicts(),
+                }
+                for assembler in list(self._assemblers.values())
+            },
+            "not_understood": self._book.ignored.report(time.monotonic()),
+        }
+
     def _open(self, port: int) -> socket.socket:
         udp = bind_udp(self._host, port)
         self._flood = FloodWatch(FloodFilter(udp))
@@ -70,17 +103,19 @@ class OscBodies(Receiver):
             self._rate_limiter.bad(sender)
             self._intake.drop("not_allowed", _name(sender), "its address is in no network of --allow")
             return
-        assembler = self._assemblers.get(sender) or FrameAssembler(f"osc:{_name(sender)}")
+        assembler = self._assemblers.get(sender) or FrameAssembler(f"osc:{_name(sender)}", self._book)
         before = assembler.incomplete
         try:
-            frames, relevant = assembler.add(split_packet(datagram), now_s)
+            frames, useful, faults = assembler.add(split_packet(datagram), now_s)
         except MessageError as error:
-            self._rate_limiter.bad(sender)
-            self._intake.drop("malformed", assembler.source, error)
-            return
-        if relevant:
+            frames, useful, faults = [], False, [str(error)]
+        if useful:
             self._rate_limiter.good(sender)
             self._remember(sender, assembler)
+        elif faults and now_s - assembler.heard_s > WORKING_S:
+            self._rate_limiter.bad(sender)
+        if faults:
+            self._intake.drop("malformed", assembler.source, faults[0], len(faults))
         self._pass_on(assembler, frames, before)
 
     def _remember(self, sender: Address, assembler: FrameAssembler) -> None:
@@ -92,6 +127,7 @@ class OscBodies(Receiver):
     def _idle(self, now_s: float) -> float:
         if self._flood is not None:
             self._flood.look(now_s, self._assemblers.keys())
+        self._report(now_s)
         waiting = False
         for assembler in self._assemblers.values():
             if assembler.pending:
@@ -99,6 +135,33 @@ class OscBodies(Receiver):
                 self._pass_on(assembler, assembler.flush(now_s), before)
                 waiting = waiting or assembler.pending
         return GAP_S if waiting else IDLE_S
+
+    def _report(self, now_s: float) -> None:
+        """Log what a sender sends that is of no use, once in a while."""
+        if now_s - self._reported_s < REPORT_S:
+            return
+        self._reported_s = now_s
+        for kind, line in self._complaints():
+            if self._log_throttle.admit(kind) is not None:
+                _log.warning("%s", line)
+
+    def _complaints(self) -> Iterator[tuple[str, str]]:
+        """What is wrong with the senders at present: the kind of the complaint, and a line for the log."""
+        working = {each.source for each in self._assemblers.values()}
+        for source, addresses in self._book.ignored.by_source().items():
+            if source not in working:
+                yield (
+                    "address",
+                    f"{source} sends addresses that are not understood: {', '.join(addresses[:8])}; a rig file can "
+                    "declare them ([[server.osc_address]], docs/protocol-in.md)",
+                )
+        for sender in self._assemblers.values():
+            for name, fault in sender.clock.set_aside().items():
+                yield name, f"{sender.source}: its {name} {fault}, so the {sender.clock.used} gives the times"
+            for body, missing in sender.memory.halves().items():
+                yield "half", f"{sender.source}: body {body} is not used, because its {missing} never arrives"
+            for body in sender.memory.conflicts():
+                yield "key", f"{sender.source}: two bodies have the key {body}, so neither is used; rename one of them"
 
     def _pass_on(self, assembler: FrameAssembler, frames: list[BodyFrame], incomplete_before: int) -> None:
         if lost := assembler.incomplete - incomplete_before:

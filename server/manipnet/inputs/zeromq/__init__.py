@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from manipnet.common.options import Port, option
+from manipnet.common.options import Endpoint, Endpoints, Port, option
 from manipnet.inputs.declaration import Input, Receiver, Reception
 
 if TYPE_CHECKING:
@@ -15,12 +15,15 @@ class ZmqInputOptions:
     """Where bodies are received over ZeroMQ."""
 
     input_port: int = option(5556, Port(), "TCP port for tracked bodies over ZeroMQ (SUB)")
+    connect: tuple[Endpoint, ...] = option(
+        (), Endpoints("tcp"), "connect to a tracker that binds its ZeroMQ socket (PUB); repeatable"
+    )
 
 
 def _open(options: ZmqInputOptions, reception: Reception) -> Receiver:
     from manipnet.inputs.zeromq.receiver import ZmqBodies
 
-    return ZmqBodies(reception.intake, reception.host, options.input_port, reception.keys)
+    return ZmqBodies(reception.intake, reception.host, options.input_port, reception.keys, options.connect)
 
 
 def _player(host: str, port: int) -> "BodySender":

@@ -1,29 +1,38 @@
 """Receives body messages, which `docs/protocol-in.md` describes, on a bound SUB socket with a thread of its own."""
 
-import time
+from typing import Any
 
 import zmq
 
+from manipnet.common.options import Endpoint
 from manipnet.inputs.base import Intake
 from manipnet.inputs.declaration import Receiver
+from manipnet.inputs.zeromq.messages import BodyMessages
+from manipnet.inputs.zeromq.trackers import TrackerConnections
 from manipnet.net.curve_keys import ServerKeys
-from manipnet.net.rate_limit import SourceRateLimiter
+from manipnet.net.errors import ListenError
 from manipnet.net.supervised import ReceiverHealth, SupervisedThread
 from manipnet.net.zmq_socket import BoundSocket
-from manipnet.wire.bodies import MAX_MESSAGE_BYTES, MessageError, parse_bodies
 
 
 class ZmqBodies(Receiver):
     """Receives body messages on `tcp://host:port`. Port 0 takes any free port, which `address` names after `start`.
 
-    With `keys`, connections are encrypted and only clients on the list of keys may send.
+    With `keys`, connections are encrypted and only clients on the list of keys may send. Messages also come from the
+    `trackers` that bind their sockets, to which it connects, without keys.
     """
 
     def __init__(
-        self, intake: Intake, host: str = "127.0.0.1", port: int = 5556, keys: ServerKeys | None = None
+        self,
+        intake: Intake,
+        host: str = "127.0.0.1",
+        port: int = 5556,
+        keys: ServerKeys | None = None,
+        trackers: tuple[Endpoint, ...] = (),
     ) -> None:
         self._intake, self._keys = intake, keys
-        self._rate_limiter = SourceRateLimiter()
+        self._messages = BodyMessages(intake)
+        self._trackers = TrackerConnections(intake, trackers) if trackers else None
         self._host, self._port = host, port
         self._bound: BoundSocket | None = None
         self._thread: SupervisedThread | None = None
@@ -37,11 +46,19 @@ class ZmqBodies(Receiver):
         # From here on, the socket belongs to the thread.
         self._thread = SupervisedThread("zmq-bodies", self._health, self._run, self._reopen)
         self._thread.start()
+        if self._trackers is not None:
+            try:
+                self._trackers.start()
+            except ListenError:
+                self.stop()
+                raise
 
     def stop(self) -> None:
         """Stop receiving and free the port. Does nothing if the receiver was not started."""
         if self._thread is None:
             return
+        if self._trackers is not None:
+            self._trackers.stop()
         self._thread.stopping.set()
         if (bound := self._bound) is not None:
             bound.interrupt()
@@ -54,6 +71,13 @@ class ZmqBodies(Receiver):
         """The number of senders that are connected. From any thread."""
         bound = self._bound
         return 0 if bound is None else bound.connected()
+
+    def status(self) -> dict[str, Any]:
+        """The clocks of the senders, and by address, whether the trackers to connect to are connected."""
+        if self._trackers is None:
+            return {"senders": self._messages.status(), "trackers": {}}
+        senders = {**self._messages.status(), **self._trackers.messages.status()}
+        return {"senders": senders, "trackers": self._trackers.status()}
 
     def _bind(self, port: int) -> BoundSocket:
         bound = BoundSocket(zmq.SUB, self._host, port, self._intake.telemetry, self._keys)
@@ -71,43 +95,10 @@ class ZmqBodies(Receiver):
         bound = self._bound
         assert bound is not None
         with bound.socket as subscriber:
-            skipping = False
             while True:
                 part = subscriber.recv(copy=False)
                 try:
-                    skipping = self._take(bound, part, skipping)
+                    bound.delivered(part)
+                    self._messages.take(part)
                 except Exception:
-                    skipping = part.more
                     self._health.message_failed()
-
-    def _take(self, bound: BoundSocket, part: zmq.Frame, skipping: bool) -> bool:
-        """Take one part; returns whether the rest of its message is skipped."""
-        bound.delivered(part)
-        if part.more:
-            return True
-        if skipping:  # the parts of a multipart message are skipped; its last one is reported
-            self._intake.drop("malformed", _source(part), "the message has several frames; send one")
-        else:
-            self._receive(part)
-        return False
-
-    def _receive(self, part: zmq.Frame) -> None:
-        now_s = time.monotonic()
-        source = _source(part)
-        if not self._rate_limiter.admits(source, now_s):
-            self._intake.drop("rate", source, "too many messages that cannot be used")
-            return
-        try:
-            frame = parse_bodies(part.bytes, now_s, source)
-        except MessageError as error:
-            self._rate_limiter.bad(source)
-            reason = "oversized" if len(part.buffer) > MAX_MESSAGE_BYTES else "malformed"
-            self._intake.drop(reason, source, error)
-            return
-        self._rate_limiter.good(source)
-        self._intake.accept(frame)
-
-
-def _source(part: zmq.Frame) -> str:
-    """The peer's address and the descriptor of its connection, which tells two senders on one machine apart."""
-    return f"zmq:{part.get('Peer-Address')}#{part.get(zmq.SRCFD)}"

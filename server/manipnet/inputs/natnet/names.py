@@ -1,0 +1,69 @@
+"""Which names the ids in a stream have, and when to ask the server for its definitions again."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from manipnet.inputs.natnet.definitions import Definitions
+from manipnet.inputs.natnet.frames import MocapFrame, RigidBody
+
+LONGEST_ASK_S: Final = 30.0
+"""The definitions are asked for at once when an unknown id arrives. If they do not name it, the pauses grow to this."""
+
+
+class Names:
+    """The newest definitions of a server."""
+
+    def __init__(self) -> None:
+        self.definitions = Definitions()
+        self.bodies: dict[int, str] = {}
+        """The names of the rigid bodies by their ids, as far as they are unambiguous."""
+        self.conflicts: tuple[str, ...] = ()
+        """What is ambiguous in the definitions."""
+        self._ids: frozenset[int] = frozenset()
+        self._wanted = True
+        self._unknown: set[object] = set()
+        self._tries = 0
+        """How often definitions came that did not name the unknown ids."""
+        self._asked_s = float("-inf")
+
+    def forget(self) -> None:
+        """Ask for the definitions again, because they may have changed."""
+        self._wanted, self._tries = True, 0
+
+    def define(self, definitions: Definitions) -> None:
+        """Take new definitions."""
+        self.definitions, self._wanted = definitions, False
+        self.bodies, self.conflicts = definitions.names(), tuple(definitions.conflicts())
+        self._ids = frozenset(id for id, _ in definitions.bodies)
+        self._tries += bool(self._unknown)
+
+    def note(self, frame: MocapFrame) -> None:
+        """Note which ids a frame has. One that is not defined is reason enough to ask."""
+        if frame.models_changed:
+            self.forget()
+        ids, skeletons = self._ids, self.definitions.skeletons
+        unknown: set[object] = {body.id for body in frame.bodies if body.id not in ids}
+        if frame.skeletons:
+            unknown |= {f"skeleton {each.id}" for each in frame.skeletons if each.id not in skeletons}
+        if unknown != self._unknown:
+            self._unknown, self._tries = unknown, 0
+            if unknown:
+                self._asked_s = float("-inf")
+        self._wanted = self._wanted or bool(unknown)
+
+    def should_ask(self, now_s: float, period_s: float) -> bool:
+        """Whether the definitions should be requested now; the caller then does so. Call this often."""
+        pause_s = min(period_s * 2.0 ** min(self._tries, 10), max(period_s, LONGEST_ASK_S))
+        if not self._wanted or now_s - self._asked_s < pause_s:
+            return False
+        self._asked_s = now_s
+        return True
+
+    def bones(self, frame: MocapFrame) -> Iterator[tuple[str, RigidBody]]:
+        """The bones of a frame that have a name, with their names."""
+        names = self.definitions.bones
+        for skeleton in frame.skeletons:
+            for bone in skeleton.bones:
+                name = names.get((skeleton.id, bone.id & 0xFFFF))
+                if name is not None:
+                    yield name, bone

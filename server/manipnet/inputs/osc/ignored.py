@@ -1,0 +1,56 @@
+"""Counts the OSC messages that are not understood, by their address."""
+
+from typing import Final
+
+from manipnet.wire.text import read_text
+
+MOST_ADDRESSES: Final = 64
+OTHERS: Final = "other addresses"
+_MAX_SHOWN: Final = 96
+
+
+class IgnoredAddresses:
+    """Which addresses arrive and are not understood, how often, and from whom. The number of addresses is bounded."""
+
+    def __init__(self) -> None:
+        self._noted: dict[str, _Noted] = {}
+
+    def note(self, raw: bytes, form: str, source: str, now_s: float) -> None:
+        """Note a message of `source` with this address; `form` is a word among its arguments that tells its form."""
+        address = read_text(raw[:_MAX_SHOWN]) + (f" … {form}" if form else "")
+        if not address.isprintable():
+            address = ascii(address)
+        if address not in self._noted and len(self._noted) >= MOST_ADDRESSES:
+            address = OTHERS
+        noted = self._noted.get(address)
+        if noted is None:
+            noted = self._noted[address] = _Noted(now_s)
+        noted.count += 1
+        noted.newest_s, noted.source = now_s, source
+
+    def report(self, now_s: float) -> dict[str, dict[str, object]]:
+        """By address: `count`, `rate_hz`, `age_s`, and the `source` of the newest message. From any thread."""
+        return {address: noted.report(now_s) for address, noted in list(self._noted.items())}
+
+    def by_source(self) -> dict[str, list[str]]:
+        """The addresses by the sender of their newest message. From any thread."""
+        found: dict[str, list[str]] = {}
+        for address, noted in list(self._noted.items()):
+            found.setdefault(noted.source, []).append(address)
+        return found
+
+
+class _Noted:
+    __slots__ = ("count", "first_s", "newest_s", "source")
+
+    def __init__(self, now_s: float) -> None:
+        self.count, self.first_s, self.newest_s, self.source = 0, now_s, now_s, ""
+
+    def report(self, now_s: float) -> dict[str, object]:
+        passed_s = self.newest_s - self.first_s
+        return {
+            "count": self.count,
+            "rate_hz": (self.count - 1) / passed_s if passed_s > 0.0 else 0.0,
+            "age_s": max(now_s - self.newest_s, 0.0),
+            "source": self.source,
+        }
