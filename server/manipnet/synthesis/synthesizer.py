@@ -86,7 +86,8 @@ class HandStep:
 
 def state_of(hand: Hand, angles: Array) -> HandState:
     """The state of a hand posed by `angles (A,)`."""
-    return HandState(angles, *forward_kinematics(hand, angles), np.zeros(len(angles)), np.zeros(grip_size(len(hand.fingers), len(angles))))
+    grip = np.zeros(grip_size(len(hand.fingers), len(angles)))
+    return HandState(angles, *forward_kinematics(hand, angles), np.zeros(len(angles)), grip)
 
 
 def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations: Array) -> tuple[Array, Array]:
@@ -228,5 +229,8 @@ def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
-    for angles, positions, rotations, correction, distances, raw, feedback, at, turned, grip, _ in zip(*poses, strict=True):
-        yield HandStep(HandState(feedback, at, turned, correction, grip), angles, positions, rotations, distances, raw)
+    for n in range(len(poses.angles)):
+        hand = Poses(*(array[n] for array in poses))
+        feedback = hand.feedback_angles, hand.feedback_positions, hand.feedback_rotations
+        state = HandState(*feedback, hand.correction, hand.grip)
+        yield HandStep(state, hand.angles, hand.positions, hand.rotations, hand.distances, hand.raw_positions)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, matrix, stack_array, vector
-from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_JOINTS, Chains, Skeleton
+from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Chains, Skeleton
 from manipnet.synthesis.ik.ccd import solve_ccd
 from manipnet.synthesis.ik.chains import Surface, clamp
 from manipnet.synthesis.ik.grasp import grasp_confidence

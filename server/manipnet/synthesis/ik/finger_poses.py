@@ -24,7 +24,7 @@ _END_JOINT_SHARE = 0.6
 
 @inner
 def _tried(reference: float, low: float, high: float, index: int, count: int, wide: bool):
-    """Value number `index` of the `count` to try for an angle: over its range, or about the reference, finest near it."""
+    """Value `index` of the `count` to try for an angle: over its range, or about the reference, finest near it."""
     if count == 1:
         return reference
     if wide:
@@ -96,7 +96,7 @@ def touching_poses(
     costs: Array,
     poses: Array,
 ):
-    """The cheapest poses with which a finger touches the object, into `costs (K,)` and `poses (K, 4)`; returns how many.
+    """The cheapest poses with which a finger touches the object, into `costs (K,)`, `poses (K, 4)`; returns how many.
 
     They are looked for about the `reference (A,)`, or `wide`: over the finger's whole range, so that it is also found
     behind a handle. `angles (A,)`, `positions (J, 3)`, `rotations (B, 3, 3)` and `axes (A, 3)` hold the posed hand and

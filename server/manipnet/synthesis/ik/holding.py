@@ -29,7 +29,6 @@ from manipnet.synthesis.ik.grip import (
     FAILED_TICKS,
     HELD_TICKS,
     NEXT_FINGER,
-    Grip,
     last_of,
     loosen_anchor,
     move_anchor,
@@ -319,10 +318,10 @@ def _may_help(hands: Hands, h: int, finger: int, work: Work):
     grip = unpack_grip(hands.grips[int(work.numbers[h])], len(hands.chains.angles))
     if 0.0 < grip.ages[finger] < ARRIVING_TICKS:
         return False
+    nearest = np.inf
     for c in range(len(hands.chains.radii)):
-        if work.contacts[h, c, 0] < AT_OBJECT_M:
-            return True
-    return False
+        nearest = min(nearest, work.contacts[h, c, 0])
+    return nearest < AT_OBJECT_M
 
 
 @inner
@@ -338,9 +337,7 @@ def _improve_finger(hands: Hands, h: int, finger: int, holders: int, wide: bool,
     forward_kinematics_into(hands.skeleton, work.angles, work.positions, work.rotations, work.axes)
     surface, reference = _surface(hands, h, work), hands.predicted[n]
     posed = work.angles, work.positions, work.rotations, work.axes
-    found = touching_poses(
-        hands.skeleton, chains, hands.limits, surface, finger, wide, reference, *posed, costs, poses
-    )
+    found = touching_poses(hands.skeleton, chains, hands.limits, surface, finger, wide, reference, *posed, costs, poses)
     for row in range(found):
         for k in range(CHAIN_LENGTH):
             a = chains.angles[finger, k]

@@ -12,8 +12,8 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_FINGERS, 
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.ik.chains import Surface, angle_moves, capsule_sample, clamp
 from manipnet.synthesis.ik.depenetration import open_deep_fingers
-from manipnet.synthesis.ik.grip import ANCHOR
 from manipnet.synthesis.ik.grasp import finger_confidences_into
+from manipnet.synthesis.ik.grip import ANCHOR
 from manipnet.synthesis.sensing.scene import map_direction_back
 
 ITERATIONS = 4
@@ -21,10 +21,12 @@ SAMPLES = 4
 """Points along a capsule's axis that are kept a radius away from the surface."""
 TARGET_WEIGHT = 1.0
 SURFACE_WEIGHT = 6.0
-GRIP_WEIGHT_M2 = 4e-3
-ANCHOR_WEIGHT = 1.5
 STAY_WEIGHT_M2 = 4e-5
 """Pull toward the network's angles, in square metres per square radian."""
+GRIP_WEIGHT_M2 = 4e-3
+"""The same for the angles of a finger that has a pose of its own, because it carries."""
+ANCHOR_WEIGHT = 1.5
+"""Pull of a fingertip toward the place where it touched the object."""
 ALLOWED_DEPTH_M = 0.002
 """Skin gives way: the captured fingers are about this deep where they press."""
 PULL_WEIGHT = 3.0
@@ -208,14 +210,15 @@ def solve_least_squares(
     confidence: float,
     limits: Array,
     surface: Surface,
-    grips: Array,
+    weights: Array,
     anchors: Array,
     angles: Array,
 ):
     """From a first guess in `angles (A,)` to better ones there, inside `limits (A, 2)`.
 
     They stay near the angles `predicted (A,)`, bring joints to `targets (J, 3)`, keep fingers out of the object and
-    pull them onto it where the predicted `distances (J,)` or the `confidence` in a grasp say so.
+    pull them onto it where the predicted `distances (J,)` or the `confidence` in a grasp say so. `weights (F,)` and
+    `anchors (F, 4)`, flat, are those of a `Grip`.
     """
     positions, rotations, axes = _positions(), _rotations(), _axes()
     normal, slope, confidences = _square(), _row(), _confidences()
@@ -227,12 +230,10 @@ def solve_least_squares(
             normal[:] = 0.0
             for k in range(CHAIN_LENGTH):
                 angle = chains.angles[finger, k]
-                stay = STAY_WEIGHT_M2 + grips[finger] * GRIP_WEIGHT_M2
+                stay = STAY_WEIGHT_M2 + weights[finger] * GRIP_WEIGHT_M2
                 normal[k, k] = stay + 1e-9
                 slope[k] = stay * (predicted[angle] - angles[angle]) if angle >= 0 else 0.0
-            _add_targets(
-                skeleton, chains, finger, positions, axes, targets, 1.0 - grips[finger], normal, slope
-            )
+            _add_targets(skeleton, chains, finger, positions, axes, targets, 1.0 - weights[finger], normal, slope)
             anchor = anchors[ANCHOR * finger : ANCHOR * (finger + 1)]
             if anchor[0] > 0.0:
                 _add_anchor(skeleton, chains, finger, positions, axes, anchor, surface, normal, slope)
@@ -243,7 +244,7 @@ def solve_least_squares(
                 positions,
                 axes,
                 distances,
-                max(confidences[finger], grips[finger]),
+                max(confidences[finger], weights[finger]),
                 surface,
                 normal,
                 slope,

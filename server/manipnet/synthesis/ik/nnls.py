@@ -1,7 +1,7 @@
 """Non-negative least squares in six dimensions: whether contact forces can add up to a wrench.
 
-Source: Lawson and Hanson, Solving Least Squares Problems, chapter 23. At most six columns are in use at a time, so every
-step is a small Cholesky solve.
+Source: Lawson and Hanson, Solving Least Squares Problems, chapter 23. At most six columns are in use at a time, so that
+every step is a small Cholesky solve.
 """
 
 import numpy as np
