@@ -1,4 +1,4 @@
-"""Measure all figures of docs/performance.md anew and write them into it: `python benchmarks/performance_page.py`.
+"""Measure all figures of docs/performance.md again and write them into it: `python benchmarks/performance_page.py`.
 
 This takes about 17 minutes, on a machine that should do nothing else. The usual sections are written after about five
 minutes; the session of ten minutes comes last. The complete figures are written as JSON to the current folder. All
@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from manipnet_tools.bench.sections import USUAL
+from manipnet_tools.bench.options import USUAL
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 

@@ -25,7 +25,9 @@ PATIENCE_S = 20.0
 STARTS_PROCESSES = {"subprocess", "multiprocessing", "serving", "publishing", "browsing", "run_node"}
 """A module that imports one of these has tests that start programs."""
 TESTS = Path(__file__).parent
-SLOW = (TESTS / "tools/training", TESTS / "tools/bench", TESTS / "tools/doctor", TESTS / "runtime/test_bad_network.py")
+SLOW = tuple(
+    TESTS / place for place in ("fuzz", "tools/training", "tools/bench", "tools/doctor", "runtime/test_bad_network.py")
+)
 """Folders and files whose tests take a second each."""
 
 

@@ -7,7 +7,9 @@ import pytest
 
 from manipnet.common.kernel_cache import MANIFEST, check_cache, seal_cache
 
-WHOLE = b"\x80\x05 compiled code."
+WHOLE = b"\x80\x05C\x0dcompiled code."
+"""The pickle of some bytes."""
+DAMAGED = [b"", WHOLE[:1], WHOLE[:-3], WHOLE[:8] + b".", WHOLE + WHOLE[:9], b"x" * len(WHOLE), bytes(len(WHOLE))]
 
 
 @pytest.fixture
@@ -35,7 +37,7 @@ def test_what_is_whole_stays(folder: Path, caplog: pytest.LogCaptureFixture) -> 
 
 
 @pytest.mark.parametrize("name", ["a.f-1.py311.nbi", "a.f-1.py311.2.nbc"])
-@pytest.mark.parametrize("content", [b"", WHOLE[:-3], b"x" * len(WHOLE)])
+@pytest.mark.parametrize("content", DAMAGED)
 def test_all_files_of_a_function_go_if_one_is_damaged(
     folder: Path, caplog: pytest.LogCaptureFixture, name: str, content: bytes
 ) -> None:
@@ -44,6 +46,16 @@ def test_all_files_of_a_function_go_if_one_is_damaged(
     assert names(folder) == G
     assert "1 files of compiled code" in caplog.text
     assert "are damaged" in caplog.text
+
+
+@pytest.mark.parametrize("name", ["a.f-1.py311.nbi", "a.f-1.py311.2.nbc"])
+def test_a_folder_in_the_place_of_a_file_goes_too(folder: Path, name: str) -> None:
+    path = folder / "module_1" / name
+    path.unlink()
+    path.mkdir()
+    (path / "more").write_bytes(WHOLE)
+    check_cache(folder)
+    assert names(folder) == G
 
 
 def test_a_flipped_bit_is_noticed_although_the_time_is_that_of_the_manifest(folder: Path) -> None:
@@ -56,7 +68,7 @@ def test_a_flipped_bit_is_noticed_although_the_time_is_that_of_the_manifest(fold
 
 
 def test_what_another_process_has_added_or_replaced_since_stays(folder: Path) -> None:
-    (folder / "module_1" / "a.f-1.py311.nbi").write_bytes(WHOLE[:-1] + b" and more.")
+    (folder / "module_1" / "a.f-1.py311.nbi").write_bytes(WHOLE + WHOLE)
     (folder / "module_1" / "a.f-1.py311.3.nbc").write_bytes(WHOLE)
     check_cache(folder)
     assert len(names(folder)) == 6

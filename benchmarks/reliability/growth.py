@@ -18,7 +18,7 @@ from benchmarks.support import LiveServer, serving
 from benchmarks.traffic import playing, zmq_sender
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.wire import TOPIC_BIN
-from manipnet_tools.bench.harness import Rig
+from manipnet_tools.bench.harness import TickRunner
 from manipnet_tools.bench.scenarios import demo
 
 from .motion import frames, mesh_options, motion
@@ -32,10 +32,10 @@ ASK_S = 0.006
 
 def blocks() -> list[int]:
     """The number of allocated blocks after each round of ticks."""
-    rig, held = Rig(load_bundle(), demo(), actors=2), []
+    runner, held = TickRunner(load_bundle(), demo(), actors=2), []
     for _ in range(ROUNDS):
         for _ in range(TICKS):
-            rig.tick()
+            runner.tick()
         gc.collect()
         held.append(sys.getallocatedblocks())
     return held

@@ -78,7 +78,7 @@ export class Interpolator {
     return true;
   }
 
-  /** Begins anew, for a new session or after the sender's clock went back, as when a take loops. */
+  /** Starts again, for a new session or after the sender's clock went back, as when a take loops. */
   #restart(frame) {
     this.#ring.clear();
     this.#clock.reset();

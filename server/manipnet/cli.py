@@ -13,6 +13,7 @@ from pathlib import Path
 from manipnet import __version__, inputs, outputs
 from manipnet.common.options import ConfigError, options_of
 from manipnet.common.text_output import accept_any_text
+from manipnet.config.files import check_files
 from manipnet.config.flags import add_flags, read_flags
 from manipnet.config.settings import (
     FILES,
@@ -25,6 +26,8 @@ from manipnet.config.settings import (
     parse_object,
     server_config,
 )
+from manipnet.runtime.memory import check_address_space, share_arenas
+from manipnet.synthesis.model.shipped import BundleError
 
 EPILOG = """examples:
   manipnet-serve --demo                                   play a recorded performance, over and over
@@ -83,7 +86,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             print(describe(config), end="")
             return 0
         check(config)
-    except ConfigError as error:
+        check_files(config)
+        check_address_space()
+    except (ConfigError, BundleError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
     return _serve(config, arguments.log_format == "json")
@@ -120,6 +125,7 @@ def describe(config: ServerConfig) -> str:
 
 
 def _serve(config: ServerConfig, json_log: bool) -> int:
+    share_arenas()
     from manipnet.runtime.precompile import Precompiler
 
     precompiler = Precompiler()
@@ -129,7 +135,6 @@ def _serve(config: ServerConfig, json_log: bool) -> int:
     from manipnet.runtime.console import Console
     from manipnet.runtime.signals import stop_on_signals
     from manipnet.server import Server
-    from manipnet.synthesis.model.bundle import BundleError
     from manipnet.synthesis.objects.mesh import MeshError
 
     console = Console(as_json=json_log)

@@ -9,6 +9,7 @@ can step through, many times slower.
 """
 
 import hashlib
+import logging
 import math
 import os
 import shutil
@@ -70,6 +71,8 @@ def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
 matrix, vector = stack_array(3, 3), stack_array(3)
 """Working memory for a rotation, and for a point or direction."""
 
+_log = logging.getLogger(__name__)
+
 COMPILED = ("geometry.py", "synthesis", "tracking")
 """Where compiled functions are, and the constants that are compiled into them; nothing else is part of the state."""
 
@@ -110,8 +113,9 @@ def _use_own_cache() -> Path | None:
             if time.time() - old.stat().st_mtime > _KEEP_S:
                 shutil.rmtree(old, ignore_errors=True)
         kernel_cache.check_cache(folder)
-    except OSError:
-        return None  # numba then uses its default folders
+    except OSError as error:
+        _log.warning("the folder %s cannot be used for compiled code (%s); numba chooses another one", folder, error)
+        return None
     config.CACHE_DIR = str(folder)  # pyright: ignore[reportAttributeAccessIssue]: set at run time
     return folder
 

@@ -1,4 +1,4 @@
-"""What one session counts and measures: one `Telemetry` object, which is handed down to whoever reports something.
+"""What one session counts and measures: one `Telemetry` object, which is passed to everything that reports something.
 
 Every counter has one label. The counters are declared here, with the values that their labels may take; the protocols
 add theirs with `Telemetry.declare` when they open. The sets are closed from then on, so a sender cannot make them grow.

@@ -250,6 +250,7 @@ def actor_config(offsets: dict[str, Array] | None = None, hand_scale: float = 1.
     return ActorConfig("actor", wrists, (), hand_scale)
 
 
+@pytest.mark.slow
 def test_fingers_after_calibration_are_those_of_the_true_wrists(bundle, cube: Shape) -> None:
     rng = np.random.default_rng(8)
     true = {side: pose(rng.normal(0.0, 0.05, 3), rng.normal(size=4)) for side in SIDES}

@@ -83,7 +83,7 @@ def test_a_tracked_prop_makes_room_last_and_its_history_goes(bundle) -> None:
 
 def test_the_props_of_the_rig_never_make_room(bundle) -> None:
     full = actor(bundle, MAX_OBJECTS)
-    with pytest.raises(ValueError, match="has 32 props already, which are of the rig or held"):
+    with pytest.raises(ValueError, match="already has 32 props, all of them in the rig or held"):
         full.carry("more", "cube", CUBE, 1.0)
     full.carry("Rig3", "cube", CUBE, 2.0)
     assert len(full.props) == MAX_OBJECTS

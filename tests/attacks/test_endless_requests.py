@@ -79,8 +79,9 @@ def test_a_long_mesh_build_lets_others_be_answered(server: LiveServer, tmp_path:
     paused = 0
     while not done.is_set() and paused < 20:
         assert server.ask({"op": "pause"})["paused"] is True
+        assert server.ask({"op": "select_object", "body": "Box", "object": "cube"})["object"] == "cube"
         paused += 1
-    assert not done.is_set(), "pause had to wait for the mesh"
+    assert not done.is_set(), "a request had to wait for the mesh"
     thread.join()
 
 
@@ -112,7 +113,8 @@ def test_a_recording_that_begins_lets_others_be_answered(server: LiveServer, tmp
         {"op": "select_object", "body": "Box", "object": "cube", "scale": 10**400},
         {"op": "add_object", "file": "a\0b.ply"},
         {"op": "select_object", "body": "a\x1b[31m\n", "object": "cube"},
-        {"op": "record", "name": "COM1"},
+        {"op": "add_object", "file": "/tmp/\ud800.ply"},
+        *({"op": "record", "name": name} for name in ("COM1", "com¹", "LPT9.mcap", "nul", "Aux .x", "con.take")),
     ],
 )
 def test_what_makes_no_sense_is_refused_by_its_reason(server: LiveServer, request_: dict) -> None:

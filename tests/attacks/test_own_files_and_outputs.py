@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from live_server import PATIENCE_S, START_S, free_ports
+from live_server import PATIENCE_S, START_S, free_ports, serving
 
 OPTIONS = ("--mesh", "日本=hammer")
 """A prop that is not among those whose shapes come with the program."""
@@ -46,15 +46,35 @@ def kernels(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return folder
 
 
+def _empty(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def _keep_one_byte(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:1])
+
+
+def _keep_half(file: Path) -> None:
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+
+
+def _put_a_folder_in_its_place(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+DAMAGES = (_empty, _keep_one_byte, _keep_half, _put_a_folder_in_its_place)
+
+
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc", ".npz"])
 def test_a_cut_cache_is_rebuilt_and_reported(kernels: Path, tiny_bundle: Path, tmp_path: Path, suffix: str) -> None:
     cache = tmp_path / "cache"
     shutil.copytree(kernels, cache)
     files = sorted(cache.rglob(f"*{suffix}"))
     assert files, f"the cache holds no {suffix}"
-    for file, kept in zip(files, (0.0, 0.5), strict=False):  # a few, since all of it takes long to compile
-        content = file.read_bytes()
-        file.write_bytes(content[: int(kept * len(content))])
+    for file, damage in zip(files, DAMAGES, strict=False):  # a few, since all of it takes long to compile
+        damage(file)
     server = start(tmp_path, tiny_bundle, MANIPNET_CACHE=str(cache))
     wait_ready(server)
     _, errors = end(server)
@@ -69,6 +89,25 @@ def test_a_name_that_the_output_cannot_show_ends_nothing(tiny_bundle: Path, tmp_
     lines = [server.stdout.readline() for _ in range(3)]
     assert all(lines)
     end(server)
+
+
+def test_a_name_that_the_system_cannot_write_is_refused_by_its_reason(tiny_bundle: Path, tmp_path: Path) -> None:
+    ascii_only = {"LANG": "C", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    takes = tmp_path / "takes"
+    with serving("--model", str(tiny_bundle), "--takes", str(takes), environment=ascii_only) as server:
+        for request in ({"op": "record", "name": "Übung"}, {"op": "add_object", "file": str(tmp_path / "Würfel.ply")}):
+            error = server.ask(request)["error"]
+            assert "this system cannot write" in error
+            assert "PYTHONUTF8=1" in error
+        assert server.ask({"op": "record", "name": "Uebung"})["name"] == "Uebung.mcap"
+        assert "error" not in server.ask({"op": "stop_recording"})
+
+
+def test_takes_are_listed_although_one_is_a_link_to_nowhere(tiny_bundle: Path, tmp_path: Path) -> None:
+    (tmp_path / "lost.mcap").symlink_to(tmp_path / "nowhere.mcap")
+    (tmp_path / "whole.mcap").touch()
+    with serving("--model", str(tiny_bundle), "--takes", str(tmp_path)) as server:
+        assert server.ask({"op": "recordings"})["recordings"] == ["whole.mcap", "lost.mcap"]
 
 
 def test_a_closed_pipe_leaves_the_log_alive(tiny_bundle: Path, tmp_path: Path) -> None:
@@ -104,3 +143,15 @@ def test_no_library_reports_home(tiny_bundle: Path, tmp_path: Path) -> None:
     end(server)
     left = [str(path) for path in home.rglob("*") if "Microsoft" in str(path) or "onnxruntime" in path.name.lower()]
     assert left == []
+
+
+def test_the_doctors_report_goes_into_a_file_of_any_encoding(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "manipnet_tools.cli", "doctor", "--seconds", "0.5"]
+    ports = ["--input-port", "0", "--osc-port", "0", "--control-port", "1"]
+    narrow = {**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    with open(tmp_path / "report.txt", "wb") as report:
+        ended = subprocess.run(
+            [*command, *ports], stdout=report, stderr=subprocess.PIPE, env=narrow, timeout=START_S, check=False
+        )
+    assert b"Traceback" not in ended.stderr
+    assert "nothing arrives" in (tmp_path / "report.txt").read_text(encoding="cp1252")

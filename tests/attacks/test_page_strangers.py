@@ -5,12 +5,13 @@ import http.client
 import json
 import shutil
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from browser import browsing
+from browser import Page, browsing
 from browser import serving as serving_files
 from live_server import LiveServer, Sender, scene, serving
 from websockets.sync.server import ServerConnection, serve
@@ -108,6 +109,33 @@ def test_names_are_shown_as_text_and_run_nothing(tiny_bundle: Path, chromium: st
                 assert page.evaluate("window.hit === undefined && document.querySelector('iframe') === null")
             finally:
                 sender.close()
+
+
+def open_tab(page: Page, name: str, shown: str) -> None:
+    """Click a tab until one of its fields is shown: a panel that is still being laid out moves away from a click."""
+    page.wait_for(f"{TEXT}.includes('Waiting for bodies')", BROWSER_S)
+    give_up_s = time.monotonic() + BROWSER_S
+    while not page.evaluate(f"[...document.querySelectorAll('input')].some(one => {shown})"):
+        assert time.monotonic() < give_up_s, f"the tab {name} does not open"
+        page.click(name, BROWSER_S)
+
+
+def test_names_of_files_and_errors_about_them_run_nothing(tiny_bundle: Path, chromium: str, tmp_path: Path) -> None:
+    takes, objects = tmp_path / "takes", tmp_path / "objects"
+    for folder in (takes, objects):
+        folder.mkdir()
+        for name in (PICTURE, LINK):
+            (folder / f"{name}{'.mcap' if folder is takes else '.stl'}").write_bytes(b"neither a take nor a mesh")
+    options = ("--mesh", "Box=cube", "--model", str(tiny_bundle), "--takes", str(takes), "--objects", str(objects))
+    with serving(*options) as server, browsing(chromium, server.addresses["page"], tmp_path / "profile") as page:
+        open_tab(page, "Takes", "one.value.endsWith('.mcap')")
+        page.choose("Take", f"{PICTURE}.mcap")
+        page.click("Show this take")
+        page.wait_for(f"{TEXT}.includes('not a recording')", BROWSER_S)
+        open_tab(page, "Objects", "one.value === 'Box'")
+        page.choose("Object", PICTURE)
+        page.wait_for(f"{TEXT}.includes({json.dumps(f'{PICTURE}.stl')})", BROWSER_S)
+        assert page.evaluate("window.hit === undefined && document.querySelector('img[onerror]') === null")
 
 
 def test_no_frame_of_a_foreign_page_shows_it(server: LiveServer, chromium: str, tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def keys(tmp_path: Path) -> tuple[Path, ClientKeys]:
 
 @contextmanager
 def crowd(address: str, count: int, first: bytes = b"") -> Iterator[None]:
-    """`count` connections that send `first` and then nothing, each opened anew when the server closes it."""
+    """`count` connections that send `first` and then nothing, each opened again when the server closes it."""
     split, stopping = urlsplit(address), threading.Event()
 
     def keep_open() -> None:

@@ -206,7 +206,7 @@ def test_other_machines_may_connect_only_if_it_is_asked_for() -> None:
 
 @pytest.mark.parametrize("text", ["", "Box", "=mug.obj", "Box="])
 def test_what_is_not_an_object(text: str) -> None:
-    with pytest.raises(ConfigError, match="is not NAME=FILE"):
+    with pytest.raises(ConfigError, match="must be NAME=FILE"):
         parse_object(text)
 
 

@@ -1,5 +1,5 @@
-"""Damaged inputs: good ones cut, spliced, doubled, and sprinkled with the numbers that break readers; and documents of
-the right form with the wrong things in them. All by a random generator that is an argument."""
+"""Damages inputs: cuts, splices and doubles good ones, puts in numbers that break readers, and replaces values of
+well-formed documents. Every function takes the random generator as an argument."""
 
 import copy
 from collections.abc import Iterator, Sequence
@@ -59,7 +59,7 @@ _ODD = [
 
 
 def damaged(rng: Random, good: Sequence[bytes]) -> bytes:
-    """A good input with up to six things done to it, or any bytes at all."""
+    """A good input after up to six kinds of damage, or random bytes."""
     if rng.random() < 0.05:
         return rng.randbytes(rng.randrange(600))
     data = rng.choice(good)
@@ -89,7 +89,7 @@ def _hurt(rng: Random, data: bytes, good: Sequence[bytes]) -> bytes:
 
 
 def reshaped(rng: Random, document: Any) -> Any:
-    """A good document in which up to three values are replaced, taken out, doubled, renamed, or joined by others."""
+    """A copy of a good document in which up to three values were replaced, removed, doubled, renamed or inserted."""
     document = copy.deepcopy(document)
     for _ in range(rng.randint(1, 3)):
         if places := list(_places(document)):
@@ -113,7 +113,7 @@ def _misplace(rng: Random, inside: Any, key: Any) -> None:
 
 
 def _places(inside: Any) -> Iterator[tuple[Any, Any]]:
-    """Every value of a document, as the container it is in and its key."""
+    """Every value of a document: its container and its key there."""
     for key in list(inside) if isinstance(inside, dict) else range(len(inside)):
         yield inside, key
         if isinstance(inside[key], dict | list):

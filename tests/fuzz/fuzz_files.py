@@ -1,4 +1,4 @@
-"""Files as inputs to damage: rig files, recordings, model bundles. The readers take a path, so each case is written."""
+"""Files to damage: rig files, recordings and model bundles. Their readers take a path, so every case is written."""
 
 import atexit
 import hashlib
@@ -10,7 +10,6 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-import fuzz_paths  # noqa: F401 (must come before the writers)
 from mcap.writer import CompressionType, Writer
 
 from manipnet.recording.mcap_file import BODIES, RecordingWriter, read_about, read_bodies, read_hands
@@ -30,23 +29,23 @@ ACTORS = {"actors": [{"name": name} | {k: RIG[k] for k in ("bodies", "objects")}
 
 
 def place_rig(data: bytes) -> Path:
-    """A rig file, beside the mesh it names."""
+    """Write a rig file beside the mesh that it names; returns its path."""
     (FOLDER / "mesh.obj").touch()
     return _place(FOLDER / "rig.toml", data)
 
 
 def place_recording(data: bytes) -> Path:
-    """A recording."""
+    """Write a recording; returns its path."""
     return _place(FOLDER / "recording.mcap", data)
 
 
 def read_recording(path: Path) -> object:
-    """Everything that is ever read of a recording."""
+    """Read everything that a recording holds."""
     return read_about(path), list(read_bodies(path)), list(read_hands(path))
 
 
 def toml(document: dict[str, Any]) -> bytes:
-    """A rig as a TOML text: a table where the value is one, everything below it in one line."""
+    """A rig as TOML, in which everything below a table is in one line."""
     lines = [f"{_key(key)} = {_value(value)}" for key, value in document.items() if not isinstance(value, dict)]
     for name, table in document.items():
         if isinstance(table, dict):
@@ -55,7 +54,7 @@ def toml(document: dict[str, Any]) -> bytes:
 
 
 def recordings() -> list[bytes]:
-    """A finished one; one that a killed process left; one without compression and checksums, whose inside is open."""
+    """A finished recording, one that ends early as after a kill, and one without compression and checksums."""
     body = {"name": "left_wrist", "p": [0.1, 1.0, 0.0], "q": [0.0, 0.0, 0.0, 1.0], "tracked": True}
     frames = [parse_bodies(json.dumps({"t": t, "bodies": [body]}).encode(), t, "fuzz") for t in (0.0, 0.01)]
     path = FOLDER / "good.mcap"
@@ -74,7 +73,7 @@ def recordings() -> list[bytes]:
 
 
 class Bundles:
-    """A bundle whose `bundle.json` or whose graph is replaced. Needs onnx."""
+    """Writes bundles with another `bundle.json` or another graph. Needs onnx."""
 
     def __init__(self) -> None:
         from tiny_bundle import write_tiny_bundle
@@ -84,12 +83,12 @@ class Bundles:
         self.graph = (self._folder / "manipnet.onnx").read_bytes()
 
     def place_meta(self, data: bytes) -> Path:
-        """A bundle with this `bundle.json`."""
+        """Write a bundle with this `bundle.json`; returns its folder."""
         _place(self._folder / "manipnet.onnx", self.graph)
         return _place(self._folder / "bundle.json", data).parent
 
     def place_graph(self, data: bytes) -> Path:
-        """A bundle with this graph, whose hash is right."""
+        """Write a bundle with this graph and its hash; returns its folder."""
         meta = json.loads(self.meta) | {"model_sha256": hashlib.sha256(data).hexdigest()}
         _place(self._folder / "bundle.json", json.dumps(meta).encode())
         return _place(self._folder / "manipnet.onnx", data).parent
@@ -101,7 +100,7 @@ def _place(path: Path, data: bytes) -> Path:
 
 
 def bundles() -> Bundles | None:
-    """None where onnx is not installed."""
+    """The writer of bundles, or None if onnx is not installed."""
     return Bundles() if importlib.util.find_spec("onnx") else None
 
 

@@ -150,7 +150,7 @@ def test_a_server_makes_hands_of_every_tick_of_a_take(
 ) -> None:
     stage.start_s += 1000.0
     take = short_take(stage.start_s)
-    monkeypatch.setattr(replay, "read_take", lambda path: take)
+    monkeypatch.setattr(replay, "read_take", lambda path, **_: take)
     address = stage.server.addresses["bodies" if kind == "tcp" else "osc"].partition("://")[2]
     assert cli.main(["replay", str(tmp_path), "--to", f"{kind}://{address}", "--speed", "0.5"]) == 0
     assert "sent 181 frames" in capsys.readouterr().err

@@ -59,7 +59,7 @@ def subscribe(context, door):
         if door.pub.poll(10):
             door.pub.recv()
             return sub
-        sub.poll(0)  # one that was turned away subscribes anew only when it is used
+        sub.poll(0)  # a subscriber that was refused subscribes again only when it is used
     pytest.fail("no subscription came")
 
 

@@ -190,7 +190,7 @@ def test_keys_are_never_replaced(folder):
         make_client_keys(folder, "a")
 
 
-@pytest.mark.parametrize("name", ["", "server", "../up", "a b", "x" * 65, ".hidden", "a\n"])
+@pytest.mark.parametrize("name", ["", "server", "../up", "a b", "x" * 65, ".hidden", "a\n", "NUL", "com1.a"])
 def test_wrong_client_names_are_refused(folder, name):
     with pytest.raises(KeyFileError, match="cannot be the name of a client"):
         make_client_keys(folder, name)

@@ -9,11 +9,16 @@ import time
 import msgpack
 import pytest
 import zmq
+from fake_motive import FakeMotive
 from live_server import PATIENCE_S
+from natnet_writer import Frame
 from osc_writer import bundle, osc
 
 from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.service import Control
+from manipnet.inputs.natnet import NATNET
+from manipnet.inputs.natnet.client import NatNetBodies
+from manipnet.inputs.natnet.options import NatNetOptions
 from manipnet.inputs.osc import OSC
 from manipnet.inputs.osc.receiver import OscBodies
 from manipnet.inputs.zeromq import ZEROMQ
@@ -126,6 +131,26 @@ def test_osc_comes_again_after_its_descriptor_was_closed(heard, telemetry):
         receiver.stop()
 
 
+def test_natnet_comes_again_after_its_descriptor_was_closed(heard, telemetry):
+    with FakeMotive() as motive:
+        receiver = NatNetBodies(NATNET.intake(heard, telemetry), NatNetOptions(("127.0.0.1", motive.port)))
+        receiver.start()
+        try:
+            motive.wait_for(0)
+            assert receiver._command is not None
+            os.close(receiver._command.socket.fileno())
+            wait_for(lambda: restarts(telemetry, "natnet") == 1)
+            connected, give_up_s = motive.requests[0], time.monotonic() + PATIENCE_S
+            while heard.frames.empty():  # the server knows the new socket once the client has connected again
+                assert time.monotonic() < give_up_s, f"{motive.requests[0] - connected} requests to connect"
+                motive.send(Frame(number=7).write((3, 0)))
+                threading.Event().wait(0.05)
+            assert heard.next().frame == 7
+        finally:
+            receiver.stop()
+    assert telemetry.receivers()["natnet"]["state"] == "listening"
+
+
 def ask(address: str, request: dict) -> dict:
     with zmq.Context() as context, context.socket(zmq.REQ) as client:
         client.setsockopt(zmq.LINGER, 0)
@@ -164,6 +189,7 @@ def test_a_request_whose_handling_fails_costs_only_itself(telemetry):
             client.setsockopt(zmq.LINGER, 0)
             client.connect(control.address)
             client.send(b"bad")
+            wait_for(lambda: "frames_dropped" in telemetry.counts())
             assert ask(control.address, {"op": "ping"}) == {"t": 1.0}
     finally:
         control.stop()

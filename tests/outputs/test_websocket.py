@@ -80,6 +80,7 @@ def test_a_refused_page_leaves_one_line_in_the_log(publisher, caplog):
     assert record.exc_info is None
 
 
+@pytest.mark.slow
 def test_a_client_comes_in_while_a_crowd_says_nothing(publisher, telemetry):
     host, port = publisher.address.removeprefix("ws://").split(":")
     with ExitStack() as crowd:

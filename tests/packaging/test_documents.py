@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from manipnet.inputs import INPUTS
+from manipnet.telemetry import BODY_REASONS, DROP_REASONS
+
 ROOT = Path(__file__).parents[2]
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 LISTED = subprocess.run(["git", "ls-files", "*.md"], cwd=ROOT, capture_output=True, text=True, check=False)
@@ -49,6 +52,16 @@ def test_troubleshooting_quotes_what_the_programs_say() -> None:
     cells = re.findall(r"^\| ([^|]*`[^|]*) \|", page, re.M)
     quoted = [piece.strip() for cell in cells for code in re.findall(r"`([^`]*)`", cell) for piece in code.split("…")]
     assert [piece for piece in quoted if piece not in said] == []
+
+
+def test_the_errand_about_dropped_bodies_names_every_reason() -> None:
+    errand = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").split("### Find out why a body is dropped")[1]
+    rows = [row.split("|") for row in re.findall(r"^\| `.*", errand, re.M)]
+    listed = {reason for row in rows for reason in re.findall(r"`(\w+)`", row[1])}
+    declared = {reason for each in INPUTS for reason in each.drop_reasons} | {*DROP_REASONS, *BODY_REASONS}
+    assert listed == declared
+    for file in re.findall(r"`(\w+/\w+\.py)`", errand):
+        assert (ROOT / "server" / "manipnet" / file).is_file(), file
 
 
 @pytest.mark.parametrize(

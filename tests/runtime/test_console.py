@@ -3,6 +3,7 @@
 import io
 import logging
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -50,6 +51,16 @@ def test_what_an_output_cannot_show_is_escaped(monkeypatch, tmp_path):
         assert r"\u2192 one" in errors.read_text(encoding="cp1252")
 
 
+def test_no_text_controls_the_terminal(monkeypatch, tmp_path):
+    with outputs(monkeypatch, tmp_path) as (read, errors):
+        console = Console()
+        console.say("a\x1b[31m\r\x07b\x9bc\td")
+        log(console, "x\x1b]0;title\x07")
+        console.close()
+        assert os.read(read, 4096) == b"a\\x1b[31m\\x0d\\x07b\\x9bc\td" + os.linesep.encode()
+        assert "x\\x1b]0;title\\x07" in errors.read_text()
+
+
 def test_a_closed_output_leaves_the_log_alive_and_is_reported_once(monkeypatch, tmp_path):
     with outputs(monkeypatch, tmp_path) as (read, errors):
         os.close(read)
@@ -70,3 +81,19 @@ def test_programs_accept_any_text(monkeypatch, tmp_path):
         os.set_blocking(read, False)
         assert os.read(read, 100) == b"\\u2192\n"
         os.close(read)
+
+
+OPEN_A_FILE = """
+import os
+from manipnet.common.text_output import accept_any_text
+accept_any_text()
+raise SystemExit(os.open("opened", os.O_CREAT | os.O_WRONLY))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell of Unix closes the streams")
+@pytest.mark.parametrize("closed", ["", "0", "1", "2", "01", "02", "12", "012"])
+def test_nothing_takes_the_place_of_a_closed_standard_stream(closed: str, tmp_path: Path) -> None:
+    streams = " ".join(f"{stream}>&-" for stream in closed)
+    program = ["sh", "-c", f'exec "$0" "$@" {streams}', sys.executable, "-c", OPEN_A_FILE]
+    assert subprocess.run(program, cwd=tmp_path, check=False).returncode > 2

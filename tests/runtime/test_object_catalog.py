@@ -1,5 +1,6 @@
 """Objects from files: the user's folder, files that change while a session runs, and swaps between two ticks."""
 
+import gc
 import os
 import threading
 from pathlib import Path
@@ -11,7 +12,7 @@ import trimesh
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import HYSTERESIS_M, Prop
 from manipnet.config.settings import default_actor
-from manipnet.runtime import shape_process
+from manipnet.runtime import object_catalog, shape_process
 from manipnet.runtime.mesh_watch import MeshWatch
 from manipnet.runtime.object_catalog import MAX_UNUSED, ObjectCatalog
 from manipnet.runtime.shape_process import make_shape
@@ -67,6 +68,19 @@ def test_a_folder_adds_to_the_library_and_comes_before_it(folder: Path) -> None:
     assert catalog.shape("crate") is catalog.shape("crate"), "built once"
     with pytest.raises(MeshError, match="object 'spoon' is unknown; allowed are bottle, bowl, crate, cube"):
         catalog.shape("spoon")
+
+
+def test_files_of_the_folder_that_are_no_objects_are_named_with_the_reason(folder: Path) -> None:
+    catalog = ObjectCatalog(folder)
+    box(folder / "cup.obj", 0.05)
+    box(folder / "cup.ply", 0.06)
+    (folder / "mug.fbx").touch()
+    (folder / "notes.txt").write_text("no mesh")
+    assert "cup" not in catalog.names(), "neither file is taken for the other"
+    problems = catalog.problems()
+    assert set(problems) == {"cup.obj", "cup.ply", "mug.fbx"}
+    assert problems["cup.ply"] == "cup.obj and cup.ply would be the same object; rename one of them"
+    assert "is FBX, which cannot be read; open it in Blender" in problems["mug.fbx"]
 
 
 def test_a_rigs_mesh_comes_before_the_folders(folder: Path, tmp_path: Path) -> None:
@@ -253,6 +267,7 @@ def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> Non
         assert "right" in scene.tick(-0.3, 0.1).scenes
     assert catalog.names()
     assert catalog.problems() == {}
+    assert catalog.shape("cube").name == "cube", "a shape that is there need not wait"
     assert builder.is_alive()
     finish.set()
     builder.join()
@@ -278,7 +293,24 @@ def test_added_objects_that_nobody_carries_are_given_back(tmp_path: Path) -> Non
         catalog.shape("more0")
 
 
-def test_a_shape_that_is_asked_for_again_is_kept(tmp_path: Path) -> None:
+def test_large_shapes_that_nobody_carries_take_the_places_of_more_small_ones(tmp_path: Path, monkeypatch) -> None:
+    catalog = ObjectCatalog()
+    box(tmp_path / "first.stl", 0.05)
+    triangles = len(catalog.add(tmp_path / "first.stl").mesh.faces)
+    monkeypatch.setattr(object_catalog, "MAX_UNUSED_TRIANGLES", 3 * triangles)
+    for i in range(10):
+        box(tmp_path / f"more{i}.stl", 0.07 + 1e-3 * i)
+        catalog.add(tmp_path / f"more{i}.stl")
+    gc.collect()
+    assert {shape.name for shape in catalog.shapes()} == {"more7", "more8", "more9"}
+    monkeypatch.setattr(object_catalog, "MAX_UNUSED_TRIANGLES", 1)
+    box(tmp_path / "last.stl", 0.09)
+    catalog.add(tmp_path / "last.stl")
+    gc.collect()
+    assert {shape.name for shape in catalog.shapes()} == {"last"}
+
+
+def test_a_shape_that_is_requested_again_is_kept(tmp_path: Path) -> None:
     catalog = ObjectCatalog()
     box(tmp_path / "first.stl", 0.05)
     catalog.add(tmp_path / "first.stl")

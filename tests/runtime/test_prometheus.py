@@ -43,6 +43,7 @@ def test_a_foreign_page_that_was_rebound_to_this_machine_may_not(page, host):
     assert get(page, host)[0] == 403
 
 
+@pytest.mark.slow
 def test_a_crowd_that_sends_nothing_keeps_nobody_out(page):
     address = urlsplit(page.address)
     with ExitStack() as crowd:

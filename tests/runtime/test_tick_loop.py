@@ -214,6 +214,39 @@ def test_a_message_that_cannot_be_published_is_counted_and_later_ones_go_out(ben
     assert bench.telemetry.counts()["tick_errors"] == {"publish": lost}
 
 
+def test_a_frame_whose_check_fails_costs_only_itself(bench: Bench, monkeypatch) -> None:
+    bench.play(0.6)
+    monkeypatch.setattr(bench.loop._intake._gate, "check", lambda frame: 1 / 0)
+    bench.play(0.1, start_s=0.6)
+    monkeypatch.undo()
+    assert bench.telemetry.counts()["tick_errors"] == {"input": 12}
+    assert bench.play(0.3, start_s=0.7)[-1].hands["left"].state == "live"
+
+
+def test_ticks_go_on_if_nobody_can_be_shown_them(bench: Bench, caplog) -> None:
+    class Broken:
+        watched = True
+
+        def see(self, *_: object) -> None:
+            raise OSError("the page has gone")
+
+    bench.loop._observer = Broken()
+    assert len(bench.play(1.0)) == len(bench.messages) > 0
+    assert "a tick cannot be shown on the page" in caplog.text
+
+
+def test_the_loop_goes_on_if_a_second_cannot_be_reported(bench: Bench, caplog) -> None:
+    seconds: list[float] = []
+
+    def report(now_s: float) -> None:
+        seconds.append(now_s)
+        raise ValueError("no such sender")
+
+    bench.loop.run(lambda: len(seconds) == 2, report)
+    assert seconds[1] - seconds[0] > 0.5
+    assert "cannot be reported" in caplog.text
+
+
 def test_a_hand_smaller_than_the_models_sees_a_larger_world(bundle, catalog) -> None:
     config = ActorConfig("child", {wrist: BodyConfig(wrist) for wrist in WRISTS}, hand_scale=0.5)
     telemetry = Telemetry()

@@ -32,6 +32,8 @@ solver = "none"
     for solver, options in (("ccd", ("--solver", "ccd")), ("none", ())):
         with serving("--rig", str(rig), "--model", str(tiny_bundle), *options) as server:
             another = Stage(server)
+            named = {another.server.ask({"op": op})["solver"] for op in ("hello", "status")}
+            assert named == {solver}
             angles[solver] = angles_of(another)
             another.close()
     for one, other in (("ccd", "least_squares"), ("none", "ccd"), ("none", "least_squares")):

@@ -72,14 +72,14 @@ class Page:
         return value
 
     def press(self, place: tuple[float, float], times: int = 1) -> None:
-        """Click with the mouse, as often as said in a row."""
+        """Click with the mouse, several times in a row if requested."""
         at = {"x": place[0], "y": place[1], "button": "left"}
         for count in range(1, times + 1):
             for kind in ("mousePressed", "mouseReleased"):
                 self.call("Input.dispatchMouseEvent", type=kind, clickCount=count, **at)
 
     def click(self, text: str, limit_s: float = 30.0) -> None:
-        """Click what says exactly this, once it is there."""
+        """Click the element with exactly this text, once it exists."""
         self.press(self.wait_for(f"({_CENTER})({_BY_TEXT})({json.dumps(text)}, 0)", limit_s))
 
     def type(self, label: str, text: str, number: int = 0) -> None:
@@ -150,7 +150,7 @@ def browsing(chromium: str, url: str, profile: Path) -> Iterator[Page]:
 
 
 def _page_address(profile: Path) -> str:
-    """The page's DevTools address, once the browser has told its port."""
+    """The page's DevTools address, once the browser has written its port."""
     told, give_up = profile / "DevToolsActivePort", time.monotonic() + 30
     while True:
         assert time.monotonic() < give_up, "Chromium did not start"

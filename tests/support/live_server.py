@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import queue
 import signal
 import socket
@@ -41,9 +42,20 @@ def free_ports() -> list[str]:
 class LiveServer:
     """`manipnet-serve` on free ports, in a process of its own."""
 
-    def __init__(self, *options: str, program: Sequence[str] = ("-m", "manipnet.cli")) -> None:
-        command = [sys.executable, *program, *free_ports(), *options]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def __init__(
+        self,
+        *options: str,
+        program: Sequence[str] = ("-m", "manipnet.cli"),
+        environment: Mapping[str, str] | None = None,
+    ) -> None:
+        """`environment` is added to that of the tests."""
+        self.process = subprocess.Popen(
+            [sys.executable, *program, *free_ports(), *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **(environment or {})},
+        )
         self.lines: queue.Queue[str] = queue.Queue()
         self.errors: list[str] = []
         self._threads = [
@@ -89,9 +101,9 @@ class LiveServer:
 
 
 @contextmanager
-def serving(*options: str, program: Sequence[str] = ("-m", "manipnet.cli")) -> Iterator[LiveServer]:
-    """A server that is ready. It is stopped at the end of the block."""
-    server = LiveServer(*options, program=program)
+def serving(*options: str, **how: Any) -> Iterator[LiveServer]:
+    """A server that is ready; `how` goes to `LiveServer`. It is stopped at the end of the block."""
+    server = LiveServer(*options, **how)
     try:
         yield server.wait_ready()
     finally:

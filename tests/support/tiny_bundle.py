@@ -1,7 +1,5 @@
 """A bundle without training: its network always answers with nearly the same pose, in no time."""
 
-import hashlib
-import json
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +7,8 @@ import pytest
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.model.bundle import FORMAT
+from manipnet.synthesis.model.bundle import write_bundle
 from manipnet.synthesis.model.features import pose_outputs
 from manipnet.synthesis.model.layout import layout_of
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -20,31 +17,19 @@ from manipnet.synthesis.model.shipped import shipped_hand
 def write_tiny_bundle(folder: Path, spread: float = 1e-3, hand: Hand | None = None) -> Path:
     """Write a bundle of a hand, by default the shipped one, that answers with a half-closed hand."""
     hand = hand or shipped_hand()
-    return write_bundle(folder, hand, tiny_network(hand, spread), hand.limits @ [0.7, 0.3])
+    return _write(folder, hand, tiny_network(hand, spread), hand.limits @ [0.7, 0.3])
 
 
 def write_still_bundle(folder: Path, angles: Array) -> Path:
     """Write a bundle of the shipped hand that always answers with `angles (A,)`, far from any surface."""
     hand = shipped_hand()
     network = tiny_network(hand, spread=0.0, angles=angles, distance_m=1.0)
-    return write_bundle(folder, hand, network, np.zeros(hand.angle_count))
+    return _write(folder, hand, network, np.zeros(hand.angle_count))
 
 
-def write_bundle(folder: Path, hand: Hand, network: bytes, rest_angles: Array) -> Path:
-    """Write a bundle of an ONNX graph and a hand."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "manipnet.onnx").write_bytes(network)
-    write_hand(hand, folder / HAND_FILE)
-    meta = {
-        "format": FORMAT,
-        "layout": layout_of(hand).describe(),
-        "angle_names": list(hand.angle_names),
-        "rest_angles_rad": rest_angles.tolist(),
-        "response": 0.5,
-        "limits_rad": hand.limits.tolist(),
-        "model_sha256": hashlib.sha256(network).hexdigest(),
-    }
-    (folder / "bundle.json").write_text(json.dumps(meta))
+def _write(folder: Path, hand: Hand, network: bytes, rest_angles: Array) -> Path:
+    pose = {"rest_angles_rad": rest_angles.tolist(), "limits_rad": hand.limits.tolist(), "response": 0.5}
+    write_bundle(folder, network, hand, pose)
     return folder
 
 

@@ -13,7 +13,7 @@ from manipnet.common.text_output import accept_any_text
 @dataclass(frozen=True)
 class Verb:
     """A verb and the module that does it: `module.run(options)` if there is a class of options, else
-    `module.main(argv)`."""
+    `module.main(argv)`. Options are checked before the module, and so its libraries, are imported."""
 
     summary: str
     module: str
@@ -89,6 +89,18 @@ VERBS = {
         (
             "--data DATASET                                    the shipped model on the last 20 % of every take",
             "--data DATASET --model models/mine --json figures.json",
+            "--data DATASET --only drop --takes mug1           only the drop test, on one take",
+            "--data DATASET --only drop --protocol unseen --fingers mug1=mug1.npz      what synthesize wrote",
+        ),
+    ),
+    "import": Verb(
+        "make takes for training out of public sets and glove takes",
+        "manipnet_tools.importing.command",
+        "manipnet_tools.importing.options.ImportOptions",
+        (
+            'taco TACO --out DATA --only "(stir, *"            some of the TACO set (CC BY 4.0)',
+            "dexterhand DEXTERHAND --out DATA                 the DexterHand set, with the hands as BVH",
+            "bvh gloves --mesh Mug=mug.obj --out DATA         folders of a studio's own glove takes",
         ),
     ),
     "train": Verb(
@@ -111,8 +123,8 @@ VERBS = {
     ),
     "bench": Verb(
         "measure how long each stage of a tick takes",
-        "manipnet_tools.bench",
-        None,
+        "manipnet_tools.bench.command",
+        "manipnet_tools.bench.options.BenchOptions",
         ("--only tick --seconds 20", "--json figures.json"),
     ),
     "doctor": Verb(
@@ -153,7 +165,7 @@ EXAMPLES = """examples:
   manipnet train --data DATASET --out models/mine
   manipnet doctor --rig stage.toml"""
 
-EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster"}
+EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster", "mujoco": "judge"}
 """Libraries that a plain installation lacks, and the extra that installs each."""
 
 
@@ -207,6 +219,7 @@ def _run(name: str, verb: Verb, rest: list[str]) -> int:
         if verb.options is None:
             return importlib.import_module(verb.module).main(rest) or 0
         options = _parsed(name, verb.options, rest)
+        options.check()
     except SystemExit as end:
         if not end.code and verb.examples:
             print("\nexamples:", *(f"  manipnet {name} {example}" for example in verb.examples), sep="\n")

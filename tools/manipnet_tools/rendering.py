@@ -1,4 +1,4 @@
-"""Pictures of hands and objects without a display or GPU: Embree rays, three lights, soft occlusion.
+"""Renders hands and objects without a display or GPU, with Embree rays, three lights and soft occlusion.
 
 A scene is a list of `PaintedMesh` in one right-handed, Y-up frame in metres. `render` draws one view, and
 `contact_sheet` lays several beside each other. It needs embreex and Pillow (extra `train`).
@@ -94,7 +94,7 @@ def render(
     """Draw one view of `size` (width, height) as `(height, width, 3)`; `floor_y` adds a ground plane at this height."""
     if floor_y is not None:
         meshes = [*meshes, _ground(camera.target, floor_y)]
-    scene = _Scene(meshes, ground=floor_y is not None)
+    scene = _RayScene(meshes, ground=floor_y is not None)
     rows = camera.axes()
     plane = 2.0 * np.tan(0.5 * camera.fov)
     width, height = size
@@ -126,7 +126,7 @@ def save_png(image: Image, path: Path | str) -> None:
     Pillow.fromarray(image).save(path)
 
 
-class _Scene:
+class _RayScene:
     """The triangles of all meshes in one Embree scene, with a normal and a colour at every corner."""
 
     def __init__(self, meshes: Sequence[PaintedMesh], ground: bool):

@@ -1,15 +1,15 @@
-"""What the verbs print for people."""
+"""The console on which the verbs print for people."""
 
 import sys
 
 from rich.console import Console
 
 UNLIMITED = 10_000
-"""Columns of a line that is not shown in a terminal."""
+"""Width, in columns, of output that does not go to a terminal."""
 
 
 def open_console(stderr: bool = True) -> Console:
-    """A console on standard error or standard output that prints text as it is.
+    """A console on standard error or standard output that prints text unchanged.
 
     It never breaks a line, so that paths stay whole in terminals, log files and pipes; square brackets have no meaning.
     """

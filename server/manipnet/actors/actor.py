@@ -69,12 +69,12 @@ class Actor:
 
     @property
     def sender_restarts(self) -> int:
-        """How often the sender's time began anew."""
+        """How often the sender's clock restarted."""
         return self._timeline.restarts
 
     @property
     def ticks_skipped(self) -> int:
-        """How many ticks were not shown because they fell due all at once or a sender began anew."""
+        """How many ticks were not shown because they fell due all at once or a sender restarted."""
         return self._timeline.skipped_late + self._timeline.skipped_at_restart
 
     def push(self, frame: BodyFrame) -> str | None:
@@ -98,7 +98,7 @@ class Actor:
         return self._timecodes.at(t_s)
 
     def poll(self, now_s: float) -> Tick | None:
-        """The next tick that is due at `now_s`, if any; to be called again until there is none."""
+        """The next tick that is due at `now_s`, or None. Call this again until it returns None."""
         timeline = self._timeline
         late, at_restart = timeline.skipped_late, timeline.skipped_at_restart
         tick = timeline.poll(now_s)
@@ -151,7 +151,7 @@ class Actor:
         kept = {prop.name for prop in self.config.objects} | {hand.prop for hand in self.hands.values()}
         free = [prop.name for prop in self.props if prop.name not in kept]
         if not free:
-            raise ValueError(f"{self.config.name} has {MAX_OBJECTS} props already, which are of the rig or held")
+            raise ValueError(f"{self.config.name} already has {MAX_OBJECTS} props, all of them in the rig or held")
         name = next((name for name in free if name not in self._tracked), free[0])
         self.props = [prop for prop in self.props if prop.name != name]
         self._roles.forget(name)
@@ -258,7 +258,7 @@ class Actor:
         return state_at_age(max(ages))
 
     def _elapsed_s(self, tick: Tick) -> float:
-        """Stream time since the last tick that was shown; one tick if the sender began anew in between."""
+        """Stream time since the last tick that was shown; one tick if the sender restarted in between."""
         if self._last is None or self._last[0] != tick.run:
             return TICK_S
         return (tick.index - self._last[1]) * TICK_S

@@ -1,1 +1,1 @@
-"""What every package may use."""
+"""Modules that every package may use."""

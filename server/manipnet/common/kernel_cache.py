@@ -1,13 +1,16 @@
-"""Checks the folder in which numba keeps compiled code: numba ends the program when it meets a file that is cut.
+"""Checks the folder in which numba keeps compiled code: numba crashes when it reads a file that was cut off.
 
-A manifest holds the SHA-256 of every file, and is written when everything is compiled. What has changed since, which
-another process may have added rightly, gets a light check: numba's files are pickles, so the first and the last byte of
-one that is whole are known. Nothing is unpickled here.
+A manifest holds the SHA-256 of every file, and is written when everything is compiled. A file that has
+changed since, perhaps because another process added it, gets a lighter check: numba's files are pickles, and all of
+their instructions must be there up to the last byte. Nothing is unpickled here.
 """
 
 import hashlib
+import io
 import json
 import logging
+import pickletools
+import shutil
 from pathlib import Path
 from typing import Final
 
@@ -15,8 +18,6 @@ from manipnet.common.atomic_file import replacing
 
 MANIFEST: Final = "manifest.json"
 _SUFFIXES: Final = (".nbi", ".nbc")
-_FIRST, _LAST = b"\x80", b"."
-"""The opcodes PROTO and STOP, with which a pickle begins and ends."""
 _log = logging.getLogger(__name__)
 
 _Entry = tuple[int, int, str]
@@ -37,7 +38,7 @@ def check_cache(folder: Path) -> None:
     )
     for index in {path.with_name(_function(path)) for path in damaged}:
         for path in index.parent.glob(f"{_escaped(index.name)}.*"):
-            path.unlink(missing_ok=True)
+            _delete(path)
 
 
 def seal_cache(folder: Path) -> None:
@@ -60,10 +61,30 @@ def _is_whole(path: Path, known: _Entry | None) -> bool:
     try:
         if known is not None and known[:2] == _stamp(path):
             return known[2] == _digest(path)
-        content = path.read_bytes()
+        return _has_whole_pickles(path.read_bytes())
     except FileNotFoundError:  # another process has just replaced it
         return True
-    return content.startswith(_FIRST) and content.endswith(_LAST)
+    except OSError:  # a folder, for example, or a block of the disk that cannot be read
+        return False
+
+
+def _has_whole_pickles(content: bytes) -> bool:
+    """Whether bytes are one pickle or several. Their instructions are decoded, but not followed."""
+    file = io.BytesIO(content)
+    try:
+        while file.tell() < len(content):
+            for _ in pickletools.genops(file):
+                pass
+    except Exception:  # whatever a damaged argument of an instruction leads to
+        return False
+    return bool(content)
+
+
+def _delete(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _read_manifest(path: Path) -> dict[str, _Entry]:

@@ -249,9 +249,9 @@ class Protocol:
     name: str
     """Its name in the counters."""
     summary: str
-    """Who sends or receives by it and how, in a few words."""
+    """A few words on who uses it, and how."""
     options: type
-    """The dataclass of its options. The first one says where: the port to listen on, or the other program's address."""
+    """The dataclass of its options. The first one is the port to listen on, or the other program's address."""
     ready_name: str = field(default="", kw_only=True)
     """Its name in the `ready` line and in the request `status`, if that is not `name`."""
 
@@ -262,7 +262,7 @@ class Protocol:
 
     @property
     def where(self) -> Option:
-        """The option that says where."""
+        """The option for its port or address."""
         return options_of(self.options)[0]
 
     @property
@@ -320,7 +320,7 @@ def parse_endpoint(text: str, default_port: int) -> Endpoint:
 
 
 def shorten(value: Any) -> str:
-    """A value as an error message shows it: not more than a line of it."""
+    """A value as error messages show it, in at most one line."""
     text = repr(value)
     return text if len(text) <= 60 else f"{type(value).__name__} of {len(text)} characters"
 

@@ -121,7 +121,7 @@ class ServerConfig:
     control_port: int = option(5557, Port(), "TCP port for control requests (ZeroMQ REP)", group=SERVER)
     page_port: int = option(8080, Port(), "TCP port of the live page (HTTP and WebSocket)", group=SERVER)
     metrics_port: int | None = option(
-        None, Port(), "TCP port of metrics for Prometheus (HTTP); without it, there are none", group=SERVER
+        None, Port(), "TCP port of metrics for Prometheus (HTTP); by default no metrics are served", group=SERVER
     )
     keys: Path | None = option(
         None, Folder(), "let only clients with keys connect over ZeroMQ; `manipnet keys` makes the keys", group=SERVER
@@ -170,7 +170,7 @@ def protocol_options() -> tuple[type, ...]:
 
 
 def input_options() -> tuple[Option, ...]:
-    """The options of all inputs, for whatever else receives tracked bodies."""
+    """The options of all inputs, for other programs that receive tracked bodies."""
     return tuple(each for declared in inputs.INPUTS for each in options_of(declared.options))
 
 
@@ -191,15 +191,20 @@ def default_actor(objects: tuple[ObjectConfig, ...] = ()) -> ActorConfig:
 
 
 def parse_object(text: str) -> ObjectConfig:
-    """The prop of `NAME=FILE`: the body NAME carries the mesh FILE, or the mesh of that name in the library.
+    """The prop of `--mesh NAME=FILE`: the body NAME carries the mesh FILE. Raises `ConfigError`."""
+    name, mesh = parse_mesh(text)
+    return ObjectConfig(name, BodyConfig(int(name) if name.isdecimal() else name), mesh)
+
+
+def parse_mesh(text: str) -> tuple[str, Path]:
+    """A name and a mesh file from `NAME=FILE`, where FILE may also be the name of an object of the library.
 
     Raises `ConfigError`.
     """
-    name, equals, file = text.partition("=")
-    if not (name and equals and file):
-        raise ConfigError(f"{text!r} is not NAME=FILE, for example Box=meshes/mug.obj or Box=mug")
-    mesh = Path(file) if Path(file).is_file() else library_file(file) or Path(file)
-    return ObjectConfig(name, BodyConfig(int(name) if name.isdecimal() else name), mesh)
+    name, _, file = text.partition("=")
+    if not (name and file):
+        raise ConfigError(f"--mesh {text}: must be NAME=FILE, for example Box=meshes/mug.obj or Box=mug")
+    return name, Path(file) if Path(file).is_file() else library_file(file) or Path(file)
 
 
 def check(config: ServerConfig) -> None:

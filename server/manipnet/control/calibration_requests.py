@@ -113,7 +113,7 @@ class CalibrationRequests:
         return self._proxy.ask(apply)
 
     def _store(self, actor: Actor, request: Request) -> dict[str, Any]:
-        """Write the rig file; returns the part of the answer that tells what became of it."""
+        """Write the rig file; returns the part of the answer that says whether it was written."""
         if not flag(request, "store", True):
             return {"stored": None, "note": "the rig file was not changed, as requested"}
         if self._rig is None:

@@ -1,4 +1,4 @@
-"""What is done with a request: decoded, met by the handler of its operation, answered in its own encoding.
+"""Handles requests: each is decoded, passed to the handler of its operation, and answered in its own encoding.
 
 Operations that may take seconds (a mesh is built, a process starts) run on a thread for each kind, so that `pause`
 never waits for them.
@@ -23,7 +23,7 @@ STORING_OPS: Final = ("calibrate", "place_object")
 """Operations that change the rig file on the server's machine unless the request has `"store": false`."""
 SLOW_OPS: Final = {
     "add_object": "objects",
-    "select_object": "objects",
+    "select_object": "selection",
     "record": "recording",
     "stop_recording": "recording",
     "calibrate": "rig",
@@ -40,7 +40,7 @@ Reply = Callable[[bytes], object]
 
 
 class Dispatcher:
-    """Meets requests with `handlers`, one per operation. `submit` may be called from any thread."""
+    """Passes requests to `handlers`, one per operation. `submit` may be called from any thread."""
 
     def __init__(self, handlers: Mapping[str, Handler], telemetry: Telemetry) -> None:
         self._handlers, self._telemetry = handlers, telemetry
@@ -49,9 +49,9 @@ class Dispatcher:
         self._lock = threading.Lock()
 
     def submit(self, parts: list[bytes], reply: Reply, here: bool = True) -> None:
-        """Meet one message, whatever it holds, and give the answer to `reply`: at once, or later for a slow operation.
+        """Handle one message, whatever it contains. Pass the answer to `reply`, later if the operation is slow.
 
-        `here` tells whether the message comes from this machine.
+        `here` says whether the message comes from this machine.
         """
         as_json = bool(parts) and parts[0].lstrip()[:1] in (b"{", b"[")
 
@@ -74,16 +74,16 @@ class Dispatcher:
                     'may ask; add "store": false to let the result be in force until the server stops'
                 )
             if op not in SLOW_OPS:
-                answer(self._meet(op, request), op)
+                answer(self._answer_to(op, request), op)
                 return
-            self._queue(SLOW_OPS[op]).put_nowait(lambda: answer(self._meet(op, request), op))
+            self._queue(SLOW_OPS[op]).put_nowait(lambda: answer(self._answer_to(op, request), op))
         except RequestError as error:
             answer({"error": str(error)}, op)
         except queue.Full:
-            answer({"error": f"{op} must wait: {MAX_WAITING} requests of its kind are being met; try again later"}, op)
+            answer({"error": f"{op} cannot start: {MAX_WAITING} requests of its kind are waiting; try again later"}, op)
 
     def close(self) -> None:
-        """Let the threads end as soon as they have met the request they are at."""
+        """Let the threads end after their current request."""
         with self._lock:
             for waiting in self._waiting.values():
                 with contextlib.suppress(queue.Empty):
@@ -98,7 +98,7 @@ class Dispatcher:
                 threading.Thread(target=_work, args=(self._waiting[name],), name=f"control-{name}", daemon=True).start()
             return self._waiting[name]
 
-    def _meet(self, op: str, request: Request) -> dict[str, Any]:
+    def _answer_to(self, op: str, request: Request) -> dict[str, Any]:
         try:
             return self._handlers[op](request)
         except RequestError as error:
@@ -113,7 +113,7 @@ def _work(waiting: "queue.Queue[Callable[[], None] | None]") -> None:
         try:
             task()
         except Exception:
-            _log.exception("control: an answer could not be given")
+            _log.exception("control: an answer could not be sent")
 
 
 def _decode(parts: list[bytes]) -> Request:

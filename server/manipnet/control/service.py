@@ -20,6 +20,8 @@ MAX_REQUEST_BYTES: Final = 4096
 REQUESTS_PER_S: Final = 200
 BURST: Final = 50
 """Totals over all clients; above them, replies are delayed to protect tick time."""
+MOST_ANSWERS: Final = 4
+"""Answers that wait for a client that does not read; one with a mesh may have 10 MB."""
 _ANSWERS: Final = "inproc://answers"
 
 
@@ -61,7 +63,8 @@ class Control:
         return self._door.bound.connected()
 
     def _open(self, port: int) -> "_Door":
-        return _Door(BoundSocket(zmq.ROUTER, self._host, port, self._telemetry, self._keys, MAX_REQUEST_BYTES))
+        limits = MAX_REQUEST_BYTES, MOST_ANSWERS
+        return _Door(BoundSocket(zmq.ROUTER, self._host, port, self._telemetry, self._keys, *limits))
 
     def _reopen(self) -> None:
         self._door.close()
@@ -106,7 +109,7 @@ class Control:
 
 
 class _Door:
-    """The bound socket, and the way from the threads that meet requests to it, in the same context."""
+    """The bound socket, and the internal sockets through which other threads send answers, in the same context."""
 
     def __init__(self, bound: BoundSocket) -> None:
         self.bound = bound

@@ -1,6 +1,7 @@
 """The requests about a running server. Handlers run on the control thread and reach the actors through the mailbox."""
 
 import base64
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,9 +9,19 @@ from typing import Any, Final
 
 from manipnet import __version__
 from manipnet.actors.props import Prop
+from manipnet.common.file_names import is_encodable
 from manipnet.config.settings import SCALE_RANGE
 from manipnet.control.actors_proxy import ActorsProxy
-from manipnet.control.request import Handler, Request, RequestError, body_key, choice, flag, number
+from manipnet.control.request import (
+    Handler,
+    Request,
+    RequestError,
+    body_key,
+    choice,
+    flag,
+    number,
+    quoted,
+)
 from manipnet.geometry import Array
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
@@ -30,9 +41,15 @@ class SessionRequests:
     """Most operations of `docs/protocol.md`, Control."""
 
     def __init__(
-        self, session: str, bundle: Bundle, actors_proxy: ActorsProxy, catalog: ObjectCatalog, telemetry: Telemetry
+        self,
+        session: str,
+        bundle: Bundle,
+        solver: str,
+        actors_proxy: ActorsProxy,
+        catalog: ObjectCatalog,
+        telemetry: Telemetry,
     ) -> None:
-        self._session, self._bundle = session, bundle
+        self._session, self._bundle, self._solver = session, bundle, solver
         self._proxy, self._actors = actors_proxy, actors_proxy.actors
         self._catalog, self._telemetry = catalog, telemetry
         self._started_s = time.monotonic()
@@ -58,6 +75,7 @@ class SessionRequests:
             "session": self._session,
             "model": self._bundle.name,
             "model_hash": self._bundle.model_hash,
+            "solver": self._solver,
             "tick_hz": TICK_HZ,
             "actors": [actor.config.name for actor in self._actors],
             "joint_names": list(JOINT_NAMES),
@@ -69,7 +87,8 @@ class SessionRequests:
     def _status(self, _: Request) -> dict[str, Any]:
         now_s = time.monotonic()
         report = self._proxy.ask(lambda: status(self._actors, self._telemetry, now_s))
-        return {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s, **report}
+        about = {"session": self._session, "uptime_s": now_s - self._started_s, "t": now_s}
+        return {**about, "model": self._bundle.name, "solver": self._solver, **report}
 
     def _objects(self, _: Request) -> dict[str, Any]:
         def carried() -> dict[str, Any]:
@@ -113,6 +132,11 @@ class SessionRequests:
         file = request.get("file")
         if not isinstance(file, str) or not 0 < len(file) <= MAX_PATH or "\0" in file:
             raise RequestError("file is missing or is not a path; give the path of a mesh on the server's machine")
+        if not is_encodable(Path(file)):
+            raise RequestError(
+                f"file is {quoted(file)}, which this system cannot write in its encoding "
+                f"({sys.getfilesystemencoding()}); use ASCII letters, or start the server with PYTHONUTF8=1"
+            )
         try:
             shape = self._catalog.add(Path(file), choice(request, "unit", tuple(UNITS_M), default="m"))
         except MeshError as error:

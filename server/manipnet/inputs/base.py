@@ -1,4 +1,4 @@
-"""What every receiver does with what arrives: count it, log what is wrong with it, and pass on the good frames."""
+"""Counts what a receiver receives, logs what is wrong with it, and passes on the good frames."""
 
 import logging
 from collections.abc import Callable, Iterable

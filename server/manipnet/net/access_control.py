@@ -23,7 +23,7 @@ SOON_MS: Final = 20
 _LOG_PERIOD_S: Final = 5.0
 _REFUSED: Final = {
     "handshake": "a client that does not speak ZMTP 3{keys}, or whose socket is not a {peer} socket",
-    "socket_type": "a client whose socket has the wrong type (a PUSH, for example): use a {peer} socket",
+    "socket_type": "a client whose socket has the wrong type (a PUSH, say): use a {peer} socket that connects here",
     "not_listed": "a client whose key is not in clients.allow",
     "too_many": "a client, since too many are connected or in the handshake",
     "endless": "a client that sends frames without end, but no message",

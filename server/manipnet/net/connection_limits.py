@@ -36,7 +36,7 @@ _CURVE_BYTES: Final = _GREETING_BYTES + 170
 """What a CURVE server has sent before the handshake is complete: its greeting and WELCOME (RFC 26)."""
 
 Refuse = Callable[[str], None]
-"""Called with the reason why a connection was refused or closed: handshake, socket_type, too_many or endless."""
+"""Called with the reason why a connection was refused: `handshake`, `socket_type`, `too_many` or `endless`."""
 
 
 @dataclass(slots=True)
@@ -54,12 +54,12 @@ class _Connection:
 
 
 class Connections:
-    """The open connections, as the socket's events tell. One thread calls everything but `delivered` and `len`."""
+    """The open connections, as the socket's events report. One thread calls everything but `delivered` and `len`."""
 
     def __init__(
         self, most: int, refuse: Refuse, curve: bool = False, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`most` connections are admitted. `curve` tells that the handshake is CURVE's, not NULL's."""
+        """`most` connections are admitted. `curve` says whether the handshake is CURVE's or NULL's."""
         self._most, self._refuse, self._clock = most, refuse, clock
         self._curve = curve
         self._port = 0
@@ -189,7 +189,7 @@ class Connections:
         return ""
 
     def _traffic(self, descriptor: int, connection: _Connection) -> tuple[int, int]:
-        """All bytes that were received and acknowledged, or those from before if the system does not tell."""
+        """All bytes that were received and acknowledged, or the number from before if the system does not report it."""
         if sys.platform == "linux":
             with self._borrowed(descriptor) as tcp:
                 if tcp is not None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
-import zmq
+from manipnet.common.file_names import is_device
 
 SERVER_FILE = "server.toml"
 ALLOW_FILE = "clients.allow"
@@ -66,10 +66,11 @@ def make_server_keys(folder: Path) -> ServerKeys:
 
 def make_client_keys(folder: Path, name: str) -> Path:
     """Make a client's file in `folder` and add the client to the list. Raises `KeyFileError`."""
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", name) or f"{name}.toml" == SERVER_FILE:
+    usable = re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", name) and not is_device(name)
+    if not usable or f"{name}.toml" == SERVER_FILE:
         raise KeyFileError(
             f"{name!r} cannot be the name of a client; it must be 1 to 64 letters, digits, '_', '-' and '.', begin "
-            "with a letter or digit, and not be 'server'"
+            "with a letter or digit, and not be 'server' or a device of Windows such as 'con'"
         )
     server, pair = read_server_keys(folder), _new_pair()
     path = folder / f"{name}.toml"
@@ -124,6 +125,8 @@ def read_allow_list(path: Path) -> dict[str, str]:
 
 
 def _new_pair() -> KeyPair:
+    import zmq  # reading keys, and the command line about keys, take no ZeroMQ
+
     if not zmq.has("curve"):
         raise KeyFileError("this build of ZeroMQ has no CURVE encryption; install the pyzmq wheel from PyPI")
     public, secret = zmq.curve_keypair()

@@ -45,7 +45,7 @@ class HalfOpen:
 
 
 class _Connection(ServerConnection):
-    """A connection that tells when it begins and ends, and whether the client has sent anything."""
+    """A connection that reports when it begins and ends, and whether the client has sent anything."""
 
     def __init__(self, half_open: HalfOpen, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -65,19 +65,24 @@ class _Connection(ServerConnection):
         super().connection_lost(exc)
 
 
+_FAULTS_OF_CLIENTS: Final = ("opening handshake failed", "unexpected internal error")
+"""What `websockets` logs with a traceback when a client breaks off or breaks the protocol in an unexpected way."""
+
+
 class _ShortLog(logging.Filter):
-    """Turns the traceback of a failed handshake into one line."""
+    """Turns the traceback of a client's fault into one line."""
 
     def filter(self, record: logging.LogRecord) -> bool:
         """Whether the record is logged."""
-        if record.exc_info is None or record.msg != "opening handshake failed":
+        if record.exc_info is None or record.msg not in _FAULTS_OF_CLIENTS:
             return True
         error = record.exc_info[1]
         if isinstance(error, EOFError | ConnectionError) or isinstance(
             getattr(error, "__cause__", None), EOFError | ConnectionError
         ):
             return False  # the client has gone
-        record.msg, record.args, record.exc_info = "refused a connection: %s", (error,), None
+        reason = str(error) or type(error).__name__
+        record.msg, record.args, record.exc_info = "refused a connection: %s", (reason,), None
         record.levelno, record.levelname = logging.WARNING, "WARNING"
         return True
 

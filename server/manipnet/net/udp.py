@@ -186,7 +186,7 @@ def _reason(error: Exception) -> str:
 
 
 def kernel_drops(udp: socket.socket) -> int:
-    """The datagrams that the kernel dropped because the socket's buffer was full, or 0 if the system does not tell."""
+    """The datagrams that the kernel dropped because the socket's buffer was full; 0 if they are not reported."""
     if sys.platform != "linux":
         return 0
     try:

@@ -36,17 +36,19 @@ class BoundSocket:
         telemetry: Telemetry,
         keys: ServerKeys | None = None,
         max_bytes: int = MAX_WIRE_BYTES,
+        high_water_mark: int = HIGH_WATER_MARK,
     ) -> None:
         """Bind the socket, where port 0 takes any free port. Raises `ListenError` and `KeyFileError`.
 
-        A client that sends a message of more than `max_bytes` loses its connection.
+        A client that sends a message of more than `max_bytes` loses its connection. `high_water_mark` messages may wait
+        for each client.
         """
         endpoint, ipv6 = zmq_endpoint(host, port)
         self.context = zmq.Context()
         self._ending = threading.Lock()
         self._access: AccessControl | None = None
         self.socket: zmq.Socket = self.context.socket(kind)
-        _limit(self.socket, max_bytes, ipv6)
+        _limit(self.socket, max_bytes, ipv6, high_water_mark)
         try:
             self._access = AccessControl(self.context, self.socket, telemetry, keys, failed=self._terminate)
             self.socket.bind(endpoint)

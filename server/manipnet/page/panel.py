@@ -125,7 +125,7 @@ def _headline(show: Show, status: dict[str, Any], history: History) -> str:
 
 
 def _warnings(status: dict[str, Any]) -> list[str]:
-    """What a visitor must know first: sockets that have failed, and a server that anybody may use."""
+    """Warnings about sockets that have failed, and about a server that anybody may use."""
     warnings = [
         f"⚠ **{escape(name)} is down** and will be opened again: {escape(receiver['error'])}"
         for name, receiver in status.get("receivers", {}).items()

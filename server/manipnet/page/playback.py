@@ -36,13 +36,17 @@ class Recording:
 
 
 def read_recording(path: Path) -> Recording:
-    """Read a recording. Raises `RecordingError`, also if it holds no hands."""
+    """Read a recording. Raises `RecordingError`, also if it holds no hands or its metadata is damaged."""
     messages = list(read_hands(path))
     if not messages:
         raise RecordingError(f"{path.name}: holds bodies but no hands; play it to a server with `manipnet replay`")
     messages = tuple(message for message in messages if message.actor == messages[0].actor)
     props, shapes = [], {}
-    for name, (mesh, scale) in _meshes(read_about(path)).items():
+    try:
+        meshes = _meshes(read_about(path))
+    except (AttributeError, TypeError, ValueError) as error:
+        raise RecordingError(f"{path.name}: the metadata about its objects is damaged: {error}") from None
+    for name, (mesh, scale) in meshes.items():
         shapes[mesh.content_hash] = ShapeView(mesh.name, mesh.content_hash, mesh.vertices, mesh.faces)
         props.append(PropView(name, mesh.name, mesh.content_hash, scale, NO_OFFSET))
     return Recording(path.name, messages, tuple(props), shapes)

@@ -1,7 +1,7 @@
 """What the page allows a browser: scripts and sockets of its own only, and no frame of another page around it.
 
 Viser's client takes the address of its socket from the URL, runs code that arrives there, and renders HTML in Markdown.
-The policy is what stands between that and whoever can make an operator follow a link or read a name.
+The policy protects an operator who follows a link or reads a name that an attacker has made.
 Source: Content Security Policy Level 3, https://www.w3.org/TR/CSP3/.
 """
 

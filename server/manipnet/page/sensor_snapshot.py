@@ -42,7 +42,7 @@ class SensorView:
 
 
 class SensorViews:
-    """Computes sensor views. Each shape is built, or read from the cache, once."""
+    """Computes sensor views. Each shape is built, or read from the cache, once while a prop of the frame has it."""
 
     def __init__(self, hand: Hand) -> None:
         self._hand = hand
@@ -51,6 +51,8 @@ class SensorViews:
     def view(self, frame: Frame, side: Side, shape: ShapeView, prop_scale: float) -> SensorView:
         """The sensors of one hand, beside the shape of its prop."""
         hand, shown = frame.hands[side], frame.message.hands[side]
+        used = {prop.content_hash for prop in frame.props}
+        self._shapes = {name: built for name, built in self._shapes.items() if name in used}
         size, positions, rotations = shown.scale, *forward_kinematics(self._hand, np.asarray(shown.angles, np.float64))
         wrist, obj = (
             scale_positions(np.asarray(pose, np.float64), 1.0 / size)

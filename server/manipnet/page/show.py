@@ -51,13 +51,19 @@ class Show:
         threading.Thread(target=self._draw_live, name="draw", daemon=True).start()
 
     def add_shape(self, shape: ShapeView) -> None:
-        """Remember a shape that live frames refer to by its hash."""
-        self._shapes[shape.content_hash] = shape
+        """Remember a shape that the next live frame refers to by its hash."""
+        self._shapes = {**self._shapes, shape.content_hash: shape}
 
     def add_frame(self, frame: Frame) -> None:
-        """Take a live frame; it is drawn unless a newer one of the same actor arrives first."""
+        """Take a live frame; it is drawn unless a newer one of the same actor arrives first.
+
+        Shapes that the newest frame of no actor refers to are forgotten.
+        """
         actor = frame.message.actor
         self.live[actor] = frame
+        used = {prop.content_hash for each in self.live.values() for prop in each.props}
+        if not used.issuperset(self._shapes):
+            self._shapes = {name: shape for name, shape in self._shapes.items() if name in used}
         self.histories.setdefault(actor, History()).note(frame.message)
         self._arrived.set()
 

@@ -41,7 +41,7 @@ LASTED_S: Final = 60.0
 
 _log = logging.getLogger(__name__)
 Submit = Callable[[list[bytes], Callable[[bytes], object]], None]
-"""Meets a request, and gives the answer to the function, on any thread."""
+"""Handles a request, and passes the answer to the function, on any thread."""
 
 
 class LivePage:
@@ -85,11 +85,13 @@ class LivePage:
 
     def _run(self) -> None:
         pause_s = RESTART_S[0]
-        while self._visited():
+        while not self._stopping.is_set():
             begin_s = time.monotonic()
             try:
-                self._serve()
-            except Exception as error:  # the session must continue without a page
+                if self._visited():
+                    begin_s = time.monotonic()
+                    self._serve()
+            except Exception as error:  # the session must continue without a page, until there is one again
                 _log.error("the page failed: %s: %s", type(error).__name__, error)
             if self._stopping.is_set():
                 return
@@ -147,7 +149,10 @@ class LivePage:
                 _log.log(content[0], "%s", content[1])
 
     def _send(self, ours: Connection) -> None:
-        """Send the newest ticks, and each shape before the first tick that refers to it."""
+        """Send the newest ticks, and each shape before the first tick that refers to it.
+
+        The page forgets a shape when the newest tick of no actor refers to it, so it is sent again if it comes back.
+        """
         try:
             self._send_newest(ours)
         except Exception:  # a page that shows nothing more must not look like one that does
@@ -155,7 +160,8 @@ class LivePage:
             ours.close()
 
     def _send_newest(self, ours: Connection) -> None:
-        sent: set[str] = set()
+        sent: dict[str, set[str]] = {}
+        """The shapes of the newest tick of each actor, which the page has."""
         while not ours.closed:
             with self._arrived:
                 if not self._newest:
@@ -164,11 +170,11 @@ class LivePage:
             begin_s = time.monotonic()
             for frame, shapes in newest:
                 for shape in shapes:
-                    if shape.content_hash not in sent:
-                        sent.add(shape.content_hash)
+                    if not any(shape.content_hash in known for known in sent.values()):
                         mesh = shape.mesh
                         view = ShapeView(shape.name, shape.content_hash, mesh.vertices, mesh.faces)
                         self._send_message(ours, "shape", view)
+                sent[frame.message.actor] = {shape.content_hash for shape in shapes}
                 self._send_message(ours, "frame", frame)
                 self._telemetry.count("page_frames", fate="shown")
             time.sleep(max(begin_s + 1.0 / FRAMES_HZ - time.monotonic(), 0.0))

@@ -2,7 +2,9 @@
 
 import asyncio
 import contextlib
+import logging
 import socket
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from http import HTTPStatus
@@ -27,15 +29,20 @@ SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="u
 DROP_PATH: Final = "/drop"
 OPEN_S: Final = 10.0
 """A visitor that has not sent a whole request after this time is cut off."""
+MAX_VISITORS: Final = 16
+"""Operators, and as many other visitors, who can only watch and so take no place from an operator."""
 MAX_DROPS: Final = 2
 """Files of up to 50 MB that are taken in at once."""
+DROP_S: Final = 30.0
+"""A visitor who has not sent the whole file after this time is cut off."""
 _POLICY_VIOLATION: Final = 1008
 _TRY_AGAIN_LATER: Final = 1013
 
 Dropped = Callable[[str, bytes], str]
+_log = logging.getLogger(__name__)
 
 
-class Server(viser.ViserServer):
+class PageServer(viser.ViserServer):
     """Viser without its public tunnel, which any visitor could open otherwise."""
 
     def request_share_url(self, verbose: bool = True) -> str | None:
@@ -43,13 +50,13 @@ class Server(viser.ViserServer):
         return None
 
 
-def open_server(listener: socket.socket, label: str, dropped: Dropped) -> Server:
+def open_server(listener: socket.socket, label: str, dropped: Dropped) -> PageServer:
     """Serve on a socket that already listens; on loopback, only pages of this machine may connect.
 
     `dropped` receives the name and content of a file that an operator dropped on the page, and returns a message.
     """
     with _served_on(listener, dropped):
-        return Server(host="127.0.0.1", port=0, label=label, verbose=False)
+        return PageServer(host="127.0.0.1", port=0, label=label, verbose=False)
 
 
 @contextlib.contextmanager
@@ -57,6 +64,7 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
     """Viser has no option for a socket or for origins, so the function that it calls is replaced meanwhile."""
     original = websockets.asyncio.server.serve
     taking: set[object] = set()
+    visitors: Counter[bool] = Counter()
     exposed = not is_loopback(listener.getsockname()[0])
 
     def serve(handler: Any, _host: str, _port: int, *, process_request: Any, **options: Any) -> Any:
@@ -67,7 +75,7 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
             if urlsplit(request.path).path == DROP_PATH:
                 await _take_in(connection, request, dropped, taking)
             else:
-                await handler(connection)
+                await _visit(connection, handler, visitors)
 
         def answer(connection: ServerConnection, request: Request) -> Response | None:
             if not may_look(request.headers, exposed):
@@ -111,6 +119,20 @@ def may_act(address: str, headers: Any) -> bool:
     return is_loopback(address) and may_look(headers, exposed=False)
 
 
+async def _visit(connection: ServerConnection, handler: Any, visitors: Counter[bool]) -> None:
+    """Serve one visitor until he leaves. `visitors` counts those who are here, by whether they are operators."""
+    operator = OPERATOR.get()
+    if visitors[operator] >= MAX_VISITORS:
+        _log.warning("refused a visitor, since %d are here already", visitors.total())
+        await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_VISITORS} visitors")
+        return
+    visitors[operator] += 1
+    try:
+        await handler(connection)
+    finally:
+        visitors[operator] -= 1
+
+
 async def _take_in(connection: ServerConnection, request: Request, dropped: Dropped, taking: set[object]) -> None:
     """Receive one file: its name is in the query, its content is the only message. `taking` has the connections that
     are sending files.
@@ -124,8 +146,8 @@ async def _take_in(connection: ServerConnection, request: Request, dropped: Drop
     name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
     taking.add(connection)
     try:
-        with contextlib.suppress(ConnectionClosed):
-            content = await connection.recv(decode=False)
+        with contextlib.suppress(ConnectionClosed, TimeoutError):
+            content = await asyncio.wait_for(connection.recv(decode=False), DROP_S)
             await connection.send(await asyncio.to_thread(dropped, name, content))
     finally:
         taking.remove(connection)

@@ -35,7 +35,7 @@ BODIES: Final = "/bodies"
 HANDS: Final = "/hands"
 TF: Final = "/tf"
 ABOUT: Final = "manipnet"
-"""Name of the metadata record, which holds model, model_hash, rig and whatever else the writer knew."""
+"""Name of the metadata record, which holds model, model_hash, rig and everything else that the writer knew."""
 FLUSH_NS: Final = 250_000_000
 """A killed process loses at most this much, by the clock of the log times."""
 MAX_RECORD_BYTES: Final = 1 << 28

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,15 +12,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from manipnet.actors.props import Prop
+from manipnet.common.file_names import is_device, is_encodable
 from manipnet.control.request import Handler, Request, RequestError
-from manipnet.recording.take import Take, TakeError
+from manipnet.recording.open_recording import OpenRecording, RecordingFailedError
 from manipnet.telemetry import Telemetry
 
 NAME: Final = re.compile(r"\w([\w .-]{0,62}[\w-])?")
 MIN_FREE_BYTES: Final = 64 << 20
 """Space for a recording to begin: about a minute of one actor."""
-DEVICES: Final = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)( *\..*)?", re.IGNORECASE)
-"""Names that stand for devices on Windows, whatever suffix they have."""
 
 About = Callable[[], tuple[dict[str, str], Sequence[Prop]]]
 """What a recording depends on: its metadata, and the props whose meshes it keeps."""
@@ -30,14 +30,14 @@ class Recorder:
 
     def __init__(self, folder: Path, about: About, telemetry: Telemetry) -> None:
         self._folder, self._about, self._telemetry = folder, about, telemetry
-        self._take: Take | None = None
+        self._open: OpenRecording | None = None
         self._lock = threading.Lock()
 
     def note(self, payload: bytes) -> None:
         """Record a hands message, given as msgpack, if a recording is in progress; returns at once."""
-        take = self._current()
-        if take is not None:
-            take.note(payload)
+        recording = self._current()
+        if recording is not None:
+            recording.note(payload)
 
     def handlers(self) -> Mapping[str, Handler]:
         """One function per operation."""
@@ -48,9 +48,9 @@ class Recorder:
         with suppress(RequestError):
             self._stop_recording({})
 
-    def _current(self) -> Take | None:
-        take = self._take
-        return None if take is None or take.is_broken else take
+    def _current(self) -> OpenRecording | None:
+        recording = self._open
+        return None if recording is None or recording.is_broken else recording
 
     def _record(self, request: Request) -> dict[str, Any]:
         name = request.get("name", time.strftime("take %Y-%m-%d %H.%M.%S"))
@@ -59,16 +59,21 @@ class Recorder:
                 f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
                 "not beginning or ending with a space or dot"
             )
-        if DEVICES.fullmatch(name):
+        if is_device(name):
             raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
         path = self._folder / (name.removesuffix(".mcap") + ".mcap")
+        if not is_encodable(path):
+            raise RequestError(
+                f"name is {name!r}, which this system cannot write in its encoding ({sys.getfilesystemencoding()}); "
+                "use ASCII letters, or start the server with PYTHONUTF8=1"
+            )
         with self._lock:
-            if (take := self._current()) is not None:
-                raise RequestError(f"{take.path.name} is being recorded; end it with stop_recording first")
+            if (recording := self._current()) is not None:
+                raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
             self._check_space()
             if path.exists():
                 raise RequestError(f"{path.name} already exists; give another name")
-            self._take = self._begin(path)
+            self._open = self._begin(path)
         return {"name": path.name, "folder": str(self._folder.resolve())}
 
     def _check_space(self) -> None:
@@ -81,7 +86,7 @@ class Recorder:
                 f"{MIN_FREE_BYTES >> 20} MB to begin; make room, or start the server with --takes on another disk"
             )
 
-    def _begin(self, path: Path) -> Take:
+    def _begin(self, path: Path) -> OpenRecording:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -90,27 +95,35 @@ class Recorder:
             ) from None
         metadata, props = self._about()
         meshes = {prop.name: (prop.shape.mesh.vertices, prop.shape.mesh.faces, prop.scale) for prop in props}
-        return Take(path, metadata, meshes, self._telemetry)
+        return OpenRecording(path, metadata, meshes, self._telemetry)
 
     def _stop_recording(self, _: Request) -> dict[str, Any]:
         with self._lock:
-            take, self._take = self._take, None
-            if take is None:
+            recording, self._open = self._open, None
+            if recording is None:
                 raise RequestError("nothing is being recorded; begin with record")
             try:
-                counts = take.finish()
-            except TakeError as error:
+                counts = recording.finish()
+            except RecordingFailedError as error:
                 raise RequestError(str(error)) from None
-        return {"name": take.path.name, "seconds": take.seconds, **counts}
+        return {"name": recording.path.name, "seconds": recording.seconds, **counts}
 
     def _recordings(self, _: Request) -> dict[str, Any]:
-        take = self._current()
-        files = sorted(self._folder.glob("*.mcap"), key=lambda path: path.stat().st_mtime, reverse=True)
+        recording = self._current()
+        files = sorted(self._folder.glob("*.mcap"), key=_changed_s, reverse=True)
         return {
             "folder": str(self._folder.resolve()),
             "recordings": [path.name for path in files],
-            "recording": None if take is None else {"name": take.path.name, "seconds": take.seconds},
+            "recording": None if recording is None else {"name": recording.path.name, "seconds": recording.seconds},
         }
+
+
+def _changed_s(path: Path) -> float:
+    """When a file was changed last; 0 if it has just been deleted, or is a link to nowhere."""
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def carried_objects(props: Sequence[Prop]) -> str:

@@ -1,4 +1,4 @@
-"""A function in a process of its own, with a pipe to it.
+"""Runs a function in a process of its own, with a pipe to it.
 
 The child starts from a fresh interpreter, so that it shares no locks and no threads with the server. It ignores SIGINT:
 a Ctrl-C in a terminal reaches every process there, but it is for the server, which then ends its children. If the
@@ -14,6 +14,8 @@ import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Final
+
+from manipnet.runtime.memory import share_arenas
 
 NICE: Final = 10
 """By how much the priority of a child is lower."""
@@ -46,6 +48,11 @@ class ChildProcess:
         except Exception as error:
             self._error = error
 
+    @property
+    def exit_code(self) -> int | None:
+        """Its exit status, or the negative number of the signal that ended it; None while it runs."""
+        return self._process.exitcode
+
     def close(self, timeout_s: float | None = None) -> None:
         """Close the pipe and wait for the end of the child, at most `timeout_s`."""
         self.connection.close()
@@ -59,6 +66,7 @@ class ChildProcess:
 
 def _run(target: Callable[..., None], connection: Connection, arguments: tuple[object, ...]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    share_arenas()
     if hasattr(os, "nice") and sys.platform != "linux":
         os.nice(NICE)
     target(connection, *arguments)

@@ -6,8 +6,9 @@ from typing import Any, Final
 
 from manipnet.telemetry import LogThrottle
 
-LASTS_LOOKS: Final = 3
-"""A clock must be wrong for this many seconds before a line is logged: a replay that begins again is right soon."""
+LASTS_LOOKS: Final = 6
+"""A clock must be wrong for this many seconds before a line is logged: a replay that begins again is right soon, and so
+is a sender that makes up for a second in which its machine was busy."""
 UNIT_SPEED: Final = 50.0
 """A clock this fast does not count seconds."""
 TOLERANCE: Final = 0.1

@@ -5,6 +5,7 @@ import errno
 import json
 import logging
 import queue
+import re
 import sys
 import threading
 import time
@@ -14,6 +15,8 @@ from manipnet.common.text_output import silence
 from manipnet.telemetry import RepeatFilter
 
 WAITING_LINES: Final = 200
+_CONTROLS: Final = re.compile("[\0-\b\v-\x1f\x7f-\x9f]")
+"""Characters that would move the cursor of a terminal, or worse. Line feeds and tabs are not among them."""
 LOG_FORMAT: Final = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 
 
@@ -83,6 +86,7 @@ class Console(logging.Handler):
         stream = sys.stderr if is_log else sys.stdout
         if stream is None or (self._is_quiet and not is_log):
             return
+        text = _CONTROLS.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
         try:
             print(text, file=stream, flush=True)
         except UnicodeEncodeError:

@@ -47,7 +47,7 @@ class FrameIntake:
             return "internal"
 
     def _compare(self, frame: BodyFrame) -> str:
-        """The bodies that came beside those that are expected, for the person who has to make them match."""
+        """The bodies that arrived and those that are expected, for the person who has to make them match."""
         received = [str(body.id if body.name is None else body.name) for body in frame.bodies]
         expected = [str(key) for actor in self._actors for key in actor.expected()]
         return f"it has {', '.join(received[:8]) or 'no bodies'}; the rig expects {', '.join(expected[:16])}"

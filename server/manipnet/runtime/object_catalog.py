@@ -4,19 +4,22 @@ import logging
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from manipnet.runtime.shape_process import make_shape
+from manipnet.synthesis.objects.foreign import SUFFIXES, foreign_format
 from manipnet.synthesis.objects.library import library_file, library_names
 from manipnet.synthesis.objects.mesh import FORMATS, MeshError
 from manipnet.synthesis.objects.shape import Shape
 
 MAX_FOLDER_FILES: Final = 1000
 MAX_UNUSED: Final = 16
-"""Shapes that are kept although nobody may carry them: those that were asked for last."""
+"""Shapes that are kept although nobody may carry them: those that were requested last."""
+MAX_UNUSED_TRIANGLES: Final = 600_000
+"""Triangles of these shapes together, which take about 270 MB; the newest is kept whatever its size."""
 _log = logging.getLogger(__name__)
 
 
@@ -32,8 +35,8 @@ class Source:
 class ObjectCatalog:
     """Shapes of the rig, of the user's `folder` and of the library. Thread-safe.
 
-    A shape is built on the thread that first asks for it. It is kept while it is in use, and while it is among the
-    `MAX_UNUSED` that were asked for last. An object that a client has added is forgotten with its shape.
+    A shape is built on the thread that first requests it. It is kept while it is in use, and while it is among the
+    `MAX_UNUSED` that were requested last. An object that a client has added is forgotten with its shape.
 
     If two objects have the same name, the rig's comes before the folder's, and the folder's before the library's.
     """
@@ -48,7 +51,7 @@ class ObjectCatalog:
         self._sources: dict[str, Source] = {}
         self._of_rig: set[Source] = set()
         self._shapes: weakref.WeakValueDictionary[Source, Shape] = weakref.WeakValueDictionary()
-        self._newest = deque[Shape](maxlen=MAX_UNUSED)
+        self._newest: deque[Shape] = deque()
         self._stamps: dict[Source, tuple[int, int]] = {}
         self._unsettled: dict[Source, tuple[int, int]] = {}
         self._problems: dict[Source, str] = {}
@@ -98,9 +101,18 @@ class ObjectCatalog:
             return tuple(self._shapes.values())
 
     def problems(self) -> dict[str, str]:
-        """By file name, why the newest content of a file cannot be used; the shape from before stays in use."""
+        """By file name, why the newest content of a file cannot be used; the shape from before stays in use.
+
+        Files of the folder are among them that are meshes of formats that are not read, or that share a name.
+        """
+        files = self._files()
+        problems = {path.name: f"{path}: {reason}" for path in files if (reason := _foreign(path)) is not None}
+        for same in _by_name(files).values():
+            if len(same) > 1:
+                names = " and ".join(path.name for path in same)
+                problems |= {path.name: f"{names} would be the same object; rename one of them" for path in same}
         with self._lock:
-            return {source.path.name: text for source, text in self._problems.items()}
+            return problems | {source.path.name: text for source, text in self._problems.items()}
 
     def changed(self) -> list[tuple[Shape, Shape]]:
         """Build the shapes of changed files again; returns the old and the new shape of each.
@@ -113,13 +125,16 @@ class ObjectCatalog:
         return [(old, new) for old, new in pairs if new is not None and new.content_hash != old.content_hash]
 
     def _folder_files(self) -> dict[str, Path]:
+        """The files of the folder by the names of their objects, without those that share a name."""
+        return {name: same[0] for name, same in _by_name(self._files()).items() if len(same) == 1}
+
+    def _files(self) -> list[Path]:
         if self._folder is None:
-            return {}
+            return []
         try:
-            paths = sorted(self._folder.iterdir())[:MAX_FOLDER_FILES]
+            return sorted(self._folder.iterdir())[:MAX_FOLDER_FILES]
         except OSError:
-            return {}
-        return {path.stem: path for path in paths if path.suffix.lower() in FORMATS}
+            return []
 
     def _has_settled(self, source: Source) -> bool:
         """Whether a file differs from what was built and has not changed since the last look."""
@@ -132,12 +147,17 @@ class ObjectCatalog:
         return stamp == before
 
     def _built(self, source: Source) -> Shape:
-        with self._building:  # one shape at a time; a caller that needs no new shape does not wait for it
-            with self._lock:
-                shape = self._shapes.get(source)
-                if shape is not None:
-                    self._keep(shape)
-            return shape or self._build(source)
+        if (shape := self._known(source)) is not None:
+            return shape
+        with self._building:  # one shape at a time, and this one may have been built meanwhile
+            return self._known(source) or self._build(source)
+
+    def _known(self, source: Source) -> Shape | None:
+        with self._lock:
+            shape = self._shapes.get(source)
+            if shape is not None:
+                self._keep(shape)
+            return shape
 
     def _rebuilt(self, source: Source) -> Shape | None:
         try:
@@ -162,10 +182,12 @@ class ObjectCatalog:
         return shape
 
     def _keep(self, shape: Shape) -> None:
-        """Note that a shape was asked for; the one for which nobody has asked for longest may go instead."""
+        """Note that a shape was requested; those that were requested longest ago may go instead."""
         if shape in self._newest:
             self._newest.remove(shape)
         self._newest.append(shape)
+        while len(self._newest) > MAX_UNUSED or len(self._newest) > 1 < _triangles(self._newest) / MAX_UNUSED_TRIANGLES:
+            self._newest.popleft()
 
     def _forget_unused(self) -> None:
         """Forget the added objects whose shapes are gone, and what is known of their files."""
@@ -174,6 +196,24 @@ class ObjectCatalog:
         for notes in (self._stamps, self._unsettled, self._problems):
             for source in [source for source in notes if source not in known]:
                 del notes[source]
+
+
+def _triangles(shapes: Iterable[Shape]) -> int:
+    return sum(len(shape.mesh.faces) for shape in shapes)
+
+
+def _by_name(files: list[Path]) -> dict[str, list[Path]]:
+    """The mesh files by the names of their objects."""
+    found: dict[str, list[Path]] = {}
+    for path in files:
+        if path.suffix.lower() in FORMATS:
+            found.setdefault(path.stem, []).append(path)
+    return found
+
+
+def _foreign(path: Path) -> str | None:
+    """Why a file that is called like a mesh of another format cannot be read."""
+    return foreign_format(path) if path.suffix.lower() in SUFFIXES else None
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:

@@ -16,7 +16,7 @@ SENSING: Final = "_all_but_readings"
 
 
 def compile_aside() -> None:
-    """Compile all kernels of a start and of a tick except the solver's, by a use of each."""
+    """Compile all kernels of a start and of a tick except the solver's, by using each of them."""
     import numpy as np
 
     from manipnet.synthesis.hand.kinematics import forward_kinematics

@@ -1,4 +1,4 @@
-"""What a server reports about itself: one line per second, the answer to `status`, and warnings about lost bodies."""
+"""Reports on a server: one line per second, the answer to `status`, and warnings about lost bodies."""
 
 import logging
 import math

@@ -1,4 +1,4 @@
-"""What happens to an internal error on the tick path: it is counted, recorded and logged, and the ticks go on."""
+"""Handles internal errors on the tick path: each is counted, recorded and logged, and the ticks go on."""
 
 import logging
 import time

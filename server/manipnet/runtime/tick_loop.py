@@ -4,6 +4,7 @@ and publishes.
 It is the only thread that touches the actors, and it never waits for a client, a disk or a terminal.
 """
 
+import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Protocol
@@ -23,6 +24,7 @@ from manipnet.wire import HandsMessage, Side
 
 MAX_WAIT_S: Final = 0.05
 """The loop notices within this time that it must stop."""
+_log = logging.getLogger(__name__)
 
 
 class TickObserver(Protocol):
@@ -64,13 +66,19 @@ class TickLoop:
             while self.step(time.monotonic()):
                 self.take_in(0.0)
             if time.monotonic() >= next_second_s:
-                every_second(time.monotonic())
                 next_second_s += 1.0
+                try:
+                    every_second(time.monotonic())
+                except Exception:
+                    _log.exception("the state of this second cannot be reported")
 
     def take_in(self, wait_s: float) -> None:
         """Give every actor what the receivers left, after a wait of at most `wait_s` for something."""
         for frame in self._mailbox.wait(wait_s):
-            self._intake.push(frame)
+            try:
+                self._intake.push(frame)
+            except Exception as error:
+                self._errors.report("input", error)
 
     def step(self, now_s: float) -> bool:
         """Show the next tick of every actor that has one due; returns whether any had."""
@@ -79,7 +87,10 @@ class TickLoop:
         for actor, plan in plans:
             message = self._publisher.send(actor, plan.tick, self._show(actor, plan))
             if message is not None and self._observer is not None and self._observer.watched:
-                self._observer.see(actor, plan, message)
+                try:
+                    self._observer.see(actor, plan, message)
+                except Exception:
+                    _log.exception("a tick cannot be shown on the page")
         return bool(plans)
 
     def _plan(self, actor: Actor, tick: Tick) -> Plan:

@@ -73,7 +73,9 @@ class Session:
 
     def handlers(self) -> dict[str, Handler]:
         """The control requests about this session, one function per operation."""
-        requests = SessionRequests(self.id, self.bundle, self._proxy, self.catalog, self.telemetry).handlers()
+        requests = SessionRequests(
+            self.id, self.bundle, self.config.solver, self._proxy, self.catalog, self.telemetry
+        ).handlers()
         calibration = CalibrationRequests(self._proxy, self.config.rig).handlers()
         own = requests["status"]
 

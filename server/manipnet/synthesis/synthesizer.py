@@ -21,6 +21,7 @@ from manipnet.geometry import (
 )
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.ik.grip import grip_size
 from manipnet.synthesis.ik.pose import Poses, allocate_poses, pose_kernel
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle
@@ -62,6 +63,8 @@ class HandState:
     """`(B, 3, 3)`."""
     correction: Array
     """`(A,)` what inverse kinematics added to the network's angles, radians."""
+    grip: Array
+    """`(G,)` what the hand remembers of its grip (`ik.grip`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,8 @@ class HandStep:
 
 def state_of(hand: Hand, angles: Array) -> HandState:
     """The state of a hand posed by `angles (A,)`."""
-    return HandState(angles, *forward_kinematics(hand, angles), np.zeros(len(angles)))
+    grip = np.zeros(grip_size(len(hand.fingers), len(angles)))
+    return HandState(angles, *forward_kinematics(hand, angles), np.zeros(len(angles)), grip)
 
 
 def hand_to_world(side: Side, T_world_wrist: Array, positions: Array, rotations: Array) -> tuple[Array, Array]:
@@ -166,7 +170,7 @@ class Synthesizer:
         order = sorted(range(count), key=lambda index: id(scenes[index].shape))
         for n, index in enumerate(order):
             batch.put(n, scenes[index], states[index])
-            poses.correction[n] = states[index].correction
+            poses.correction[n], poses.grip[n] = states[index].correction, states[index].grip
         groups = _groups([scenes[index].shape for index in order])
         for shape, first, last in groups:
             sense(
@@ -225,5 +229,8 @@ def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
-    for angles, positions, rotations, correction, distances, raw, feedback, at, turned in zip(*poses, strict=True):
-        yield HandStep(HandState(feedback, at, turned, correction), angles, positions, rotations, distances, raw)
+    for n in range(len(poses.angles)):
+        hand = Poses(*(array[n] for array in poses))
+        feedback = hand.feedback_angles, hand.feedback_positions, hand.feedback_rotations
+        state = HandState(*feedback, hand.correction, hand.grip)
+        yield HandStep(state, hand.angles, hand.positions, hand.rotations, hand.distances, hand.raw_positions)

@@ -1,4 +1,4 @@
-"""Frames whose time is far from the stream's: a bad stamp, a frame that was delayed, or a sender that began anew."""
+"""Frames whose time is far from the stream's: a bad stamp, a frame that was delayed, or a sender that restarted."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -7,7 +7,7 @@ from manipnet.tracking.arrivals import Arrivals
 from manipnet.tracking.tick import Poses
 
 RESTART_S: Final = 0.5
-"""A frame this far behind the stream, or `AHEAD_S` ahead of it, may come from a sender that began anew."""
+"""A frame this far behind the stream, or `AHEAD_S` ahead of it, may come from a sender that restarted."""
 AHEAD_S: Final = 0.5
 LATE_S: Final = 10.0
 """A frame up to this far behind was delayed on its way; an older frame comes from a different clock."""

@@ -63,7 +63,7 @@ class Timeline:
         self.skipped_late = self.skipped_at_restart = 0
         """Ticks that were not shown: too many fell due at once, or a new run began before the old one played out."""
         self.restarts = 0
-        """How often the sender's time began anew."""
+        """How often the sender's clock restarted."""
         self._forecast = forecast
         self._run: Run | None = None
         self._ending: Run | None = None

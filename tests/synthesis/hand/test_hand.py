@@ -127,6 +127,7 @@ def test_three_fingers_move_as_they_do_among_five() -> None:
     np.testing.assert_allclose(angles_from_rotations(THREE, turned), angles[kept], atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("hand", [THREE, SHORT], ids=lambda hand: hand.name)
 def test_a_hand_of_fewer_bones_goes_through_the_whole_synthesis(hand: Hand, solver: str, tmp_path: Path) -> None:

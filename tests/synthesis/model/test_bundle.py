@@ -2,6 +2,7 @@
 
 import logging
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,9 @@ from other_hands import three_fingered
 from tiny_bundle import write_tiny_bundle
 
 from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
-from manipnet.synthesis.model.bundle import BundleError, load_bundle
+from manipnet.synthesis.model.bundle import NETWORK_FILE, load_bundle, write_bundle
 from manipnet.synthesis.model.layout import layout_of
-from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet.synthesis.model.shipped import BundleError, shipped_hand
 
 HAND = shipped_hand()
 LAYOUT = layout_of(HAND)
@@ -69,3 +70,17 @@ def test_another_hand_beside_a_model_is_refused(tiny_bundle: Path, tmp_path: Pat
     (folder / HAND_FILE).unlink()
     with pytest.raises(BundleError, match=r"hand\.npz: cannot be read"):
         load_bundle(folder)
+
+
+def test_the_hash_is_of_the_network_the_hand_and_the_pose(tiny_bundle: Path, tmp_path: Path) -> None:
+    bundle = load_bundle(tiny_bundle)
+    folders = {name: tmp_path / name for name in ("copy", "hand", "limits", "network")}
+    for folder in folders.values():
+        shutil.copytree(tiny_bundle, folder)
+    write_hand(replace(HAND, radii=1.1 * HAND.radii), folders["hand"] / HAND_FILE)
+    narrower = bundle.meta | {"limits_rad": (0.9 * bundle.limits).tolist()}
+    write_bundle(folders["limits"], (tiny_bundle / NETWORK_FILE).read_bytes(), HAND, narrower)
+    write_tiny_bundle(folders["network"], spread=2e-3)
+    hashes = {name: load_bundle(folder).model_hash for name, folder in folders.items()}
+    assert hashes["copy"] == bundle.model_hash
+    assert len({bundle.model_hash, *hashes.values()}) == len(folders)

@@ -1,4 +1,4 @@
-"""The generated scene of the demo: it is the one shipped, it loops, and its motion is plausible."""
+"""The generated scene of the demo is the shipped one, it loops, and its motion is plausible."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def test_the_shipped_recording_is_the_generated_one():
         np.testing.assert_allclose(along, 1.0, atol=1e-5)
 
 
-def test_the_scene_ends_as_it_began():
+def test_the_scene_ends_where_it_begins():
     for track in TAKE.bodies.values():
         np.testing.assert_allclose(track.poses[-1, :3], track.poses[0, :3], atol=0.005)
 
@@ -29,6 +29,6 @@ def test_speeds_are_those_of_a_person():
         assert speed.max() < 1.5
 
 
-def test_objects_never_sink_below_where_they_stand():
+def test_objects_never_sink_into_the_table():
     for name, home in HOMES.items():
         assert TAKE.bodies[name].poses[:, 1].min() > home[1] - 0.002

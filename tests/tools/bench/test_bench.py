@@ -1,4 +1,4 @@
-"""The benchmark measures what it says: every section runs on a small model and its figures fit together."""
+"""The benchmark runs on a small model, and its figures are consistent."""
 
 import json
 import math
@@ -9,8 +9,8 @@ import pytest
 
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.repair import is_closed
-from manipnet_tools.bench import main
-from manipnet_tools.bench.harness import STAGES, TICK, TURN, Rig, race
+from manipnet_tools import cli
+from manipnet_tools.bench.harness import STAGES, TICK, TURN, TickRunner, race
 from manipnet_tools.bench.report import verdicts, with_ratios
 from manipnet_tools.bench.scenarios import demo, endless
 from manipnet_tools.bench.shapes import gourd
@@ -24,33 +24,43 @@ def test_a_gourd_is_closed_and_has_the_triangles(triangles: int) -> None:
 
 
 def test_a_gourd_has_at_least_twelve_triangles() -> None:
-    with pytest.raises(ValueError, match="fewest are 12"):
+    with pytest.raises(ValueError, match="at least 12 are needed"):
         gourd(11)
 
 
-def test_a_performance_goes_on_without_a_jump() -> None:
-    performance = demo()
-    frames, count = endless(performance, 2), 2 * len(performance.frames) + 10
+def test_a_scenario_never_jumps() -> None:
+    scenario = demo()
+    frames, count = endless(scenario, 2), 2 * len(scenario.frames) + 10
     poses = np.array([[body.p for body in next(frames).bodies] for _ in range(count)])
-    assert poses.shape[1] == 2 * len(performance.frames[0].bodies)
+    assert poses.shape[1] == 2 * len(scenario.frames[0].bodies)
     assert np.abs(np.diff(poses, axis=0)).max() < 0.1
 
 
-def test_stages_are_the_whole_tick(tiny_bundle: Path) -> None:
-    rigs = {"one": Rig(load_bundle(tiny_bundle), demo()), "two": Rig(load_bundle(tiny_bundle), demo(), actors=2)}
-    result = race(rigs, lambda: None, 0.0, least_rounds=5)
-    for name in rigs:
+def test_the_stages_sum_to_the_whole_tick(tiny_bundle: Path) -> None:
+    runners = {
+        "one": TickRunner(load_bundle(tiny_bundle), demo()),
+        "two": TickRunner(load_bundle(tiny_bundle), demo(), actors=2),
+    }
+    result = race(runners, lambda: None, 0.0, least_rounds=5)
+    for name in runners:
         assert set(result.stages[name]) == set(STAGES)
         np.testing.assert_allclose(result.total(name), sum(result.stages[name][stage] for stage in TICK))
         assert all((of_stage > 0.0).all() for of_stage in result.stages[name].values())
     assert len(result.reference) == 5 * TURN
-    scenes, states = rigs["two"].synthesizer.asked
+    scenes, states = runners["two"].synthesizer.inputs
     assert len(scenes) == len(states) == 4
 
 
-def test_the_command_measures_and_writes(tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_measures_and_writes_the_figures(
+    tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     sections = [word for name in ("tick", "live") for word in ("--only", name)]
-    assert main(["--seconds", "2", "--model", str(tiny_bundle), "--json", str(tmp_path / "b.json"), *sections]) == 0
+    assert (
+        cli.main(
+            ["bench", "--seconds", "2", "--model", str(tiny_bundle), "--json", str(tmp_path / "b.json"), *sections]
+        )
+        == 0
+    )
     figures = json.loads((tmp_path / "b.json").read_text(encoding="utf-8"))
     tick, live = figures["tick"], figures["live"]["0.5"]
     assert tick["total"]["p50_ms"] > tick["sense"]["p50_ms"] > 0.0
@@ -63,10 +73,10 @@ def test_the_command_measures_and_writes(tiny_bundle: Path, tmp_path: Path, caps
     assert figures["machine"]["processor"] in printed
 
 
-def test_verdicts_are_about_what_was_measured() -> None:
+def test_only_measured_goals_get_a_verdict() -> None:
     actors = {name: {"total": {"p50_ms": ms}} for name, ms in (("1", 1.0), ("8", 4.0))}
     found = verdicts(with_ratios({"actors": actors, "straightforward": {"times": 25.0}}))
-    assert [(target.what, value, met) for target, value, met in found] == [
+    assert [(goal.what, value, met) for goal, value, met in found] == [
         ("8 actors over 1", 4.0, False),
         ("straightforward version over ours", 25.0, True),
     ]

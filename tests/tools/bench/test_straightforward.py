@@ -1,4 +1,4 @@
-"""The benchmark's straightforward version computes what the product computes, so that its time means something."""
+"""The straightforward version of the benchmark computes the same as the product, so that their times compare."""
 
 import importlib.util
 import sys
@@ -21,7 +21,7 @@ LAYOUT = layout_of(HAND)
 
 PATH = Path(__file__).parents[3] / "benchmarks" / "straightforward.py"
 LOOKED_UP_M = 1.5e-3
-"""Far distances come from the field in the product."""
+"""Tolerance for distances far from the surface, which the product looks up in the distance field."""
 BLOCKS = [name for name in LAYOUT.input if name not in ("ambient", "surface_normals")]
 
 
@@ -36,7 +36,7 @@ def straightforward() -> ModuleType:
     return module
 
 
-def test_it_sees_what_the_product_sees(straightforward: ModuleType, tmp_path: Path) -> None:
+def test_its_features_are_those_of_the_product(straightforward: ModuleType, tmp_path: Path) -> None:
     shape = build_shape(gourd(600), tmp_path)
     slow = straightforward.Straightforward(shape.mesh.vertices, shape.mesh.faces, 96)
     state = state_of(HAND, HAND.limits @ [0.6, 0.4])
@@ -47,11 +47,11 @@ def test_it_sees_what_the_product_sees(straightforward: ModuleType, tmp_path: Pa
             apart = np.abs(ours - theirs)[LAYOUT.input[name].columns]
             assert np.quantile(apart, 0.99) < LOOKED_UP_M, name
         occupied = np.abs(ours - theirs)[LAYOUT.input["ambient"].columns] > 0.1
-        assert occupied.mean() < 0.01, "cells whose corner touches may go either way"
+        assert occupied.mean() < 0.01, "only cells that the surface just touches may differ"
         assert np.quantile(np.abs(ours - theirs)[LAYOUT.input["surface_normals"].columns], 0.9) < 0.05
 
 
-def test_it_ticks(straightforward: ModuleType, tmp_path: Path) -> None:
+def test_it_runs_a_whole_tick(straightforward: ModuleType, tmp_path: Path) -> None:
     shape = build_shape(gourd(600), tmp_path)
     slow = straightforward.Straightforward(shape.mesh.vertices, shape.mesh.faces, 96)
     state = state_of(HAND, HAND.limits @ [0.6, 0.4])

@@ -34,9 +34,9 @@ def address(stage: Stage, what: str) -> str:
     return stage.server.addresses[what].removeprefix("tcp://")
 
 
-def test_what_a_server_says_is_recorded(stage: Stage, tmp_path: Path) -> None:
+def test_every_hands_message_of_a_server_is_recorded(stage: Stage, tmp_path: Path) -> None:
     path = tmp_path / "take.mcap"
-    heard: dict[int, HandsMessage] = {}
+    received: dict[int, HandsMessage] = {}
     with RecordingWriter(path, {}) as writer:
         recorder = threading.Thread(
             target=record_hands,
@@ -44,11 +44,11 @@ def test_what_a_server_says_is_recorded(stage: Stage, tmp_path: Path) -> None:
         )
         recorder.start()
         while recorder.is_alive():
-            heard |= {message.seq: message for message in stage.perform(0.5, scene)}
+            received |= {message.seq: message for message in stage.perform(0.5, scene)}
     recorded = list(read_hands(path))
     assert len(recorded) >= 40
     assert [message.seq - recorded[0].seq for message in recorded] == list(range(len(recorded)))
-    both = [(message, heard[message.seq]) for message in recorded if message.seq in heard]
+    both = [(message, received[message.seq]) for message in recorded if message.seq in received]
     assert len(both) > 20
     for a, b in both:
         assert np.array_equal(a.hands["left"].joints, b.hands["left"].joints)
@@ -98,7 +98,7 @@ def test_bodies_are_recorded_without_a_server(tmp_path: Path) -> None:
     assert [frame.t_s for frame in read_bodies(path)] == [k / 120 for k in range(120)]
 
 
-def test_a_killed_recorder_leaves_a_take(tmp_path: Path) -> None:
+def test_a_killed_recorder_leaves_a_file_that_can_be_repaired(tmp_path: Path) -> None:
     path = tmp_path / "take.mcap"
     command = [sys.executable, "-m", "manipnet_tools.cli", "record", "--bodies-port", "0", "--out", str(path)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=os.environ | {"COLUMNS": "200"}) as recorder:
@@ -116,8 +116,8 @@ def test_a_killed_recorder_leaves_a_take(tmp_path: Path) -> None:
     frames = list(read_bodies(path))
     assert len(frames) >= on_disk
     assert [frame.t_s for frame in frames] == [k / 120 for k in range(len(frames))]
-    assert cli.main(["recover", str(path), "--out", str(tmp_path / "mended.mcap")]) == 0
-    assert len(read_take(tmp_path / "mended.mcap").time_s) == len(frames)
+    assert cli.main(["recover", str(path), "--out", str(tmp_path / "repaired.mcap")]) == 0
+    assert len(read_take(tmp_path / "repaired.mcap").time_s) == len(frames)
 
 
 def frames_on_disk(path: Path) -> int:
@@ -127,8 +127,8 @@ def frames_on_disk(path: Path) -> int:
         return 0
 
 
-def test_a_recording_goes_in_where_the_tracker_did(stage: Stage, tmp_path: Path) -> None:
-    """Through the real socket, with another object than when it was recorded."""
+def test_a_recording_is_replayed_into_a_server(stage: Stage, tmp_path: Path) -> None:
+    """It is played through the real socket, with another object than at the time of the recording."""
     path = record_scene(tmp_path / "take.mcap", 2.5)
     assert stage.server.ask({"op": "select_object", "body": "Box", "object": "sphere"})["object"] == "sphere"
     assert cli.main(["replay", str(path), "--to", stage.server.addresses["bodies"]]) == 0

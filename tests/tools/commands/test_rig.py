@@ -1,4 +1,4 @@
-"""`manipnet rig`: it finds the wrists by name or by motion, writes a file, and refuses what it cannot do."""
+"""`manipnet rig` finds the wrists by their names or motion, writes a file, and refuses what it cannot do."""
 
 import threading
 from pathlib import Path
@@ -16,16 +16,16 @@ from manipnet_tools import cli
 from manipnet_tools.commands.rig_guess import BodyCollector, guess, rig_of
 
 
-def heard(*bodies: tuple[int | None, str | None, float]):
+def streamed(*bodies: tuple[int | None, str | None, float]):
     """Bodies by id, name, and the speed at which they move back and forth for three seconds, with a tracker's noise."""
-    listener, rng = BodyCollector(), np.random.default_rng(3)
+    collector, rng = BodyCollector(), np.random.default_rng(3)
     for i in range(360):
         samples = tuple(
             BodySample(id, name, (speed * abs((i / 120) % 1.0 - 0.5), *rng.normal(0.0, 5e-4, 2)), (0, 0, 0, 1), True)
             for id, name, speed in bodies
         )
-        listener(BodyFrame(i / 120, i, samples, i / 120, "zmq:test"))
-    return list(listener.bodies.values())
+        collector(BodyFrame(i / 120, i, samples, i / 120, "zmq:test"))
+    return list(collector.bodies.values())
 
 
 @pytest.mark.parametrize(
@@ -39,34 +39,36 @@ def heard(*bodies: tuple[int | None, str | None, float]):
         ("Ann_glove_left", "Ann_glove_right"),
     ],
 )
-def test_wrists_are_known_by_their_names(left: str, right: str) -> None:
-    found = guess(heard((3, right, 0.0), (None, "Leftover Box", 2.0), (1, left, 0.0)), {})
+def test_wrists_are_found_by_their_names(left: str, right: str) -> None:
+    found = guess(streamed((3, right, 0.0), (None, "Leftover Box", 2.0), (1, left, 0.0)), {})
     assert {part: key for part, (key, _) in found.wrists.items()} == {"left_wrist": left, "right_wrist": right}
     assert [body.key for body in found.others] == ["Leftover Box"]
 
 
-def test_wrists_without_names_are_those_that_were_waved_the_right_one_more() -> None:
-    found = guess(heard((1, None, 0.0), (2, None, 0.3), (7, None, 0.9), (8, None, 0.02)), {})
+def test_wrists_without_names_are_the_bodies_that_moved_most() -> None:
+    found = guess(streamed((1, None, 0.0), (2, None, 0.3), (7, None, 0.9), (8, None, 0.02)), {})
     assert {part: key for part, (key, _) in found.wrists.items()} == {"left_wrist": 2, "right_wrist": 7}
     assert "swapped" in found.wrists["left_wrist"][1]
 
 
-def test_what_is_given_is_not_guessed() -> None:
-    found = guess(heard((1, None, 0.9), (2, None, 0.6)), {"left_wrist": 1})
+def test_wrists_that_are_given_are_not_guessed() -> None:
+    found = guess(streamed((1, None, 0.9), (2, None, 0.6)), {"left_wrist": 1})
     assert {part: key for part, (key, _) in found.wrists.items()} == {"left_wrist": 1, "right_wrist": 2}
 
 
-def test_without_a_wrist_the_remedy_is_named() -> None:
+def test_without_a_wrist_the_error_names_the_remedy() -> None:
     with pytest.raises(
         ConfigError,
         match=r"arrived: Box, 2\); wave both hands while this command listens, the right hand more",
     ):
-        guess(heard((None, "Box", 0.0), (2, None, 0.0)), {})
+        guess(streamed((None, "Box", 0.0), (2, None, 0.0)), {})
 
 
 def test_the_rig_can_be_read_and_unknown_bodies_stay_as_comments(tmp_path: Path) -> None:
     found = guess(
-        heard((1, "LeftHand", 0.0), (2, "RightHand", 0.0), (3, "Mug 2", 0.0), (4, 'My "Head"', 0.0), (5, "Box", 0.0)),
+        streamed(
+            (1, "LeftHand", 0.0), (2, "RightHand", 0.0), (3, "Mug 2", 0.0), (4, 'My "Head"', 0.0), (5, "Box", 0.0)
+        ),
         {},
     )
     (tmp_path / "rig.toml").write_text(rig_of(found, {"natnet": "10.0.0.2"}), encoding="utf-8")
@@ -145,7 +147,7 @@ def test_init_writes_nothing_if_nothing_arrives(tmp_path: Path, capsys) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_show_is_what_the_server_would_print(capsys) -> None:
+def test_show_prints_the_same_as_the_server(capsys) -> None:
     options = ["--set", "bodies.left_wrist=3", "--mesh", "7=mug"]
     assert cli.main(["rig", "show", *options]) == 0
     shown = capsys.readouterr().out

@@ -5,20 +5,23 @@ import pytest
 
 from manipnet_tools.evaluation import metrics
 from manipnet_tools.evaluation.cases import load_cases
-from manipnet_tools.evaluation.scoring import average, score
+from manipnet_tools.evaluation.judge import Judge
+from manipnet_tools.evaluation.scoring import average
 from manipnet_tools.takes.dataset import DataError
 
 
 @pytest.fixture(scope="module")
 def captured(cases):
-    return {name: score(case, np.zeros((22, 3)), case.captured) for name, case in cases.items()}
+    return {name: Judge(case, np.zeros((22, 3)), ("scores",))(case.captured) for name, case in cases.items()}
 
 
 def test_captured_fingers_score_perfectly_on_comparisons_with_themselves(captured):
     for sides in captured.values():
         for one in sides.values():
             assert one.ratio == one.mpjpe_mm == one.tip_mm == one.drift_s == 0.0
-            assert one.contact_f1 == one.smoothness_ratio == one.idle_ratio == 1.0
+            assert one.contact_f1 == one.contact_f1_many == one.finger_recall == 1.0
+            assert one.smoothness_ratio == one.idle_ratio == one.idle_energy == 1.0
+            assert one.touching_ratio == one.slide_ratio == one.opening_ratio == 1.0
 
 
 def test_captured_fingers_explain_the_motion(captured):
@@ -53,7 +56,7 @@ def test_the_synthesis_receives_no_captured_fingers(cases):
 
 
 def test_a_folder_that_is_not_the_dataset_is_refused(tmp_path, manipnet_data):
-    with pytest.raises(DataError, match="holds no takes; expected are folders BVH"):
+    with pytest.raises(DataError, match="contains no takes; it must have folders BVH"):
         load_cases(tmp_path)
     with pytest.raises(DataError, match="has no take spoon9; it has"):
         load_cases(manipnet_data, ("spoon9",))

@@ -1,4 +1,4 @@
-"""What is exported is what was there: read back, evaluated by the format's own rules, and judged by others."""
+"""Exported files are read back, evaluated by the rules of their format, and checked by other programs."""
 
 import csv
 import json
@@ -34,7 +34,7 @@ SIDES = ("left", "right")
 
 
 def path_of(rng: np.random.Generator, away_m: float) -> np.ndarray:
-    """Poses `(T, 7)` of something that moves and tumbles."""
+    """Poses `(T, 7)` of a body that moves and tumbles."""
     s = np.linspace(0.0, 1.0, FRAMES)[:, None]
     turns = quat_exp(rng.normal(size=3) + 4.0 * s * rng.normal(size=3))
     return np.concatenate([rng.normal(size=3) * 0.2 + [away_m, 1.0, 0.0] + 0.3 * s * rng.normal(size=3), turns], axis=1)
@@ -42,7 +42,7 @@ def path_of(rng: np.random.Generator, away_m: float) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def angles() -> dict[str, np.ndarray]:
-    """Angles `(T, 20)` of two hands that move through all they can."""
+    """Angles `(T, 20)` of two hands that move through most of their range."""
     rng = np.random.default_rng(3)
     share = 0.5 + 0.45 * np.sin(np.linspace(0.0, 6.0, FRAMES)[:, None] + rng.uniform(0.0, 6.0, (2, 1, 20)))
     low, high = HAND.limits.T
@@ -63,31 +63,31 @@ def animation(angles: dict[str, np.ndarray]) -> Animation:
     return Animation("juggle", 60.0, 0.5 + np.arange(FRAMES) / 60, hands, objects, meshes)
 
 
-def turned_rad(a: np.ndarray, b: np.ndarray) -> float:
-    """The greatest angle between two sets of rotations."""
+def largest_angle_rad(a: np.ndarray, b: np.ndarray) -> float:
+    """The largest angle between corresponding rotations."""
     return float(np.linalg.norm(quat_log(quat_multiply(quat_conjugate(a), b)), axis=-1).max())
 
 
-def test_bvh_comes_back_as_it_was(animation: Animation, tmp_path: Path) -> None:
+def test_bvh_files_are_read_back_unchanged(animation: Animation, tmp_path: Path) -> None:
     write_bvh(animation, tmp_path / "take")
     take = read_take(tmp_path / "take")
     assert (take.rate_hz, take.objects) == (60.0, ("Box", "the_cup"))
     for side in SIDES:
         positions, rotations = animation.hands[side].world()
-        assert turned_rad(take.fingers[side].rotations, rotations) < 1e-4
+        assert largest_angle_rad(take.fingers[side].rotations, rotations) < 1e-4
         assert np.allclose(take.fingers[side].positions, positions, atol=1e-6)
-    assert turned_rad(take.bodies["the_cup"].poses[:, 3:], animation.objects["the cup"].poses[:, 3:]) < 1e-4
-    with pytest.raises(ExportError, match="holds BVH files already"):
+    assert largest_angle_rad(take.bodies["the_cup"].poses[:, 3:], animation.objects["the cup"].poses[:, 3:]) < 1e-4
+    with pytest.raises(ExportError, match="already contains BVH files"):
         write_bvh(animation, tmp_path / "take")
 
 
-def test_a_captured_take_comes_back_as_it_was(manipnet_data: Path, tmp_path: Path) -> None:
+def test_a_captured_take_is_read_back_unchanged(manipnet_data: Path, tmp_path: Path) -> None:
     source = manipnet_data / "BVH" / "mug1"
     write_bvh(read_animation(source, HAND), tmp_path / "take")
     before, after = read_take(source), read_take(tmp_path / "take")
     assert (after.rate_hz, after.objects) == (before.rate_hz, before.objects)
     for side in SIDES:
-        assert turned_rad(before.fingers[side].rotations, after.fingers[side].rotations) < 1e-4
+        assert largest_angle_rad(before.fingers[side].rotations, after.fingers[side].rotations) < 1e-4
         assert np.allclose(before.fingers[side].positions, after.fingers[side].positions, atol=2e-6)
     ours, theirs = (
         (folder / "leftHand.bvh").read_text().partition("MOTION")[0] for folder in (tmp_path / "take", source)
@@ -95,7 +95,7 @@ def test_a_captured_take_comes_back_as_it_was(manipnet_data: Path, tmp_path: Pat
     assert [word for word in ours.split() if word.isupper()] == [word for word in theirs.split() if word.isupper()]
 
 
-def test_bvh_for_others_is_right_handed_centimetres(animation: Animation, tmp_path: Path) -> None:
+def test_bvh_for_other_programs_is_in_right_handed_centimetres(animation: Animation, tmp_path: Path) -> None:
     write_bvh(animation, tmp_path / "blender", right_handed=True)
     for side in SIDES:
         bvh = read_bvh(tmp_path / "blender" / f"{side}Hand.bvh")
@@ -156,7 +156,7 @@ class Gltf:
 
 
 @pytest.mark.parametrize("frame", [0, 17, FRAMES - 1])
-def test_gltf_skins_the_hands_as_we_do(animation: Animation, angles, tmp_path: Path, frame: int) -> None:
+def test_gltf_skins_the_hands_like_the_kinematics(animation: Animation, angles, tmp_path: Path, frame: int) -> None:
     write_gltf(animation, tmp_path / "juggle.glb")
     gltf = Gltf(tmp_path / "juggle.glb")
     for side in SIDES:
@@ -172,7 +172,7 @@ def test_gltf_skins_the_hands_as_we_do(animation: Animation, angles, tmp_path: P
     assert np.allclose(tips, animation.hands["right"].world()[0][frame, HAND.joint_names.index("INDEX_TIP")], atol=1e-6)
 
 
-def test_gltf_faces_look_outward_and_time_starts_at_zero(animation: Animation, tmp_path: Path) -> None:
+def test_gltf_faces_point_outward_and_time_starts_at_zero(animation: Animation, tmp_path: Path) -> None:
     write_gltf(animation, tmp_path / "juggle.glb")
     gltf = Gltf(tmp_path / "juggle.glb")
     for mesh in gltf.json["meshes"]:
@@ -195,7 +195,7 @@ validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1])), {uri: 
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])
-def test_the_khronos_validator_has_nothing_to_say(animation: Animation, tmp_path: Path, suffix: str) -> None:
+def test_the_khronos_validator_finds_no_fault(animation: Animation, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"juggle{suffix}"
     write_gltf(animation, path)
     report = run_node(VALIDATE, str(path), packages=("gltf-validator@2.0.0-dev.3.10",))
@@ -205,7 +205,7 @@ def test_the_khronos_validator_has_nothing_to_say(animation: Animation, tmp_path
     assert report["info"]["animationCount"] == 1
 
 
-def test_a_stranger_reads_the_file(animation: Animation, tmp_path: Path) -> None:
+def test_trimesh_reads_the_file(animation: Animation, tmp_path: Path) -> None:
     trimesh = pytest.importorskip("trimesh")
     write_gltf(animation, tmp_path / "juggle.glb")
     scene = trimesh.load_scene(tmp_path / "juggle.glb")
@@ -252,7 +252,7 @@ def message(seq: int, t_s: float, x: float, state: State = "live", actor: str = 
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    """Two actors; the first one's animation has a gap, a second of waiting before it, and a lost stretch."""
+    """Two actors. The animation of the first has a gap and a stretch without tracking; earlier frames come first."""
     cube = load_library_mesh("cube")
     path = tmp_path / "stage.mcap"
     with RecordingWriter(path, {}, {"Box.ply": mesh_file(cube.vertices, cube.faces, 0.5)}) as writer:
@@ -287,8 +287,8 @@ def test_the_command_writes_every_format(
     kind, name = form.split()
     assert cli.main(["export", str(recording), "--format", kind, "--out", str(tmp_path / name)]) == 0
     assert (tmp_path / name).exists()
-    said = " ".join(capsys.readouterr().err.split())
-    assert "60 frames at 60 Hz (1.0 s), left, objects Box; left held or at rest in 7 frames" in said
+    printed = " ".join(capsys.readouterr().err.split())
+    assert "60 frames at 60 Hz (1.0 s), left, objects Box; left held or at rest in 7 frames" in printed
 
 
 @pytest.mark.parametrize(
@@ -299,16 +299,16 @@ def test_the_command_writes_every_format(
         (["stage.mcap", "--format", "csv", "--out", "x.csv", "--actor", "eve"], "no actor 'eve'; it has ann, bob"),
         (["stage.mcap", "--format", "csv", "--out", "x.csv", "--right-handed"], "csv is always right-handed"),
         (
-            ["stage.mcap", "--format", "gltf", "--out", "x.glb", "--mesh", "Cup=c.obj"],
+            ["stage.mcap", "--format", "gltf", "--out", "x.glb", "--mesh", "Cup=mug"],
             "no object is called 'Cup'; the objects are Box",
         ),
         (["walk.txt", "--format", "csv", "--out", "x.csv"], "holds no fingers; make them first: manipnet synthesize"),
-        (["bad.npz", "--format", "csv", "--out", "x.csv"], "is no file of `manipnet synthesize`"),
-        (["other.npz", "--format", "csv", "--out", "x.csv"], "is no file of `manipnet synthesize`"),
+        (["bad.npz", "--format", "csv", "--out", "x.csv"], "is not a file of `manipnet synthesize`"),
+        (["other.npz", "--format", "csv", "--out", "x.csv"], "is not a file of `manipnet synthesize`"),
         (["gone.npz", "--format", "csv", "--out", "x.csv"], "cannot be read (No such file"),
     ],
 )
-def test_what_cannot_be_exported_gets_the_remedy(
+def test_the_error_of_a_failed_export_names_the_remedy(
     recording: Path, arguments: list[str], complaint: str, capsys: pytest.CaptureFixture[str], monkeypatch
 ) -> None:
     monkeypatch.chdir(recording.parent)

@@ -91,11 +91,3 @@ def test_empty_cells_are_a_lost_body(tmp_path: Path) -> None:
     for track in take.bodies.values():
         assert track.tracked.tolist() == [True, False, True]
         assert np.isfinite(track.poses).all()
-
-
-@pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
-def test_another_encoding_is_refused_in_one_line(tmp_path: Path, encoding: str) -> None:
-    path = tmp_path / "take.csv"
-    path.write_bytes("Format Version,1.23,Take Name,Tänzer\n".encode(encoding))
-    with pytest.raises(ValueError, match=r"take\.csv: cannot be read.*save it as UTF-8"):
-        read_take(path)

@@ -14,7 +14,7 @@ from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.wire import SIDES
 from manipnet_tools.takes.rollout import hand_inputs, roll_out, tick_take
-from manipnet_tools.takes.take import BodyTrack, Take
+from manipnet_tools.takes.take import BodyTrack, Take, TakeError
 
 HAND = shipped_hand()
 
@@ -53,6 +53,18 @@ def test_a_shorter_look_ahead_sees_a_forecast_and_loses_less_of_the_end():
     seen, guessed = (ticks[: len(full.time_s)].bodies["box"].windows for ticks in (full, short))
     np.testing.assert_allclose(guessed[:, :13], seen[:, :13], atol=1e-6)
     assert np.abs(guessed[:, -1] - seen[:, -1]).max() > 0.01
+
+
+def test_an_object_that_is_never_tracked_costs_only_itself(caplog):
+    take = steady_take(120.0)
+    lost = BodyTrack(take.bodies["box"].poses, np.zeros(len(take.time_s), dtype=np.bool_))
+    ticks = tick_take(replace(take, bodies=take.bodies | {"Ann:Head": lost}))
+    assert set(ticks.bodies) == set(NAMES)
+    assert "these bodies are left out because they are never tracked: Ann:Head" in caplog.text
+    with pytest.raises(TakeError, match="Ann:Head has a mesh but is never tracked in the take"):
+        hand_inputs(ticks, {"Ann:Head": cube()})
+    with pytest.raises(TakeError, match="left_wrist is never tracked while the other bodies are"):
+        tick_take(replace(take, bodies=take.bodies | {"left_wrist": lost}))
 
 
 def test_a_body_that_is_not_seen_contributes_nothing():

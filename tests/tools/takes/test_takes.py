@@ -103,11 +103,11 @@ def test_a_motive_csv_in_millimetres_with_euler_angles(tmp_path: Path) -> None:
     [
         ("Format Version", "Something", "is not a CSV export of Motive"),
         ("Meters", "Furlongs", "Length Units is 'Furlongs'; allowed are meters"),
-        ("Rigid Body", "Bone", "has no rigid body with rotation and position, only Bone"),
+        ("Rigid Body", "Force Plate", "has no rigid body or bone with rotation and position, only Force Plate"),
         ("Rate,120.0", "Rate,often", "Export Frame Rate is 'often'"),
         ("Space,Global", "Space,Local", "export it as Global"),
         ("Type,Quaternion", "Type,Axis Angle", "of the type Axis Angle; export Quaternion or XYZ"),
-        ("0,0.0,", "0,zero,", "line 8: could not convert"),
+        ("1,1,2,3", "1,one,2,3", "line 8, cell 7: 'one' is not a number"),
     ],
 )
 def test_a_bad_motive_csv_is_refused_with_the_remedy(tmp_path: Path, old: str, new: str, complaint: str) -> None:

@@ -1,5 +1,5 @@
 # ruff: noqa: E402
-"""Training: which frames are used, that a model learns, and bundles that can be loaded."""
+"""Training uses the right frames, a model learns, and its bundle can be loaded."""
 
 import json
 from dataclasses import replace
@@ -54,7 +54,7 @@ def learned(hands):
     return train(hands, TINY)
 
 
-def test_a_take_played_backwards_twice_is_itself(hands):
+def test_reversing_a_take_twice_restores_it(hands):
     captured = hands[0]
     flipped = captured.backwards()
     np.testing.assert_array_equal(flipped.angles[0], captured.angles[-1])
@@ -65,7 +65,7 @@ def test_a_take_played_backwards_twice_is_itself(hands):
     )
 
 
-def test_frames_behind_the_share_are_never_learned_from(hands):
+def test_frames_after_the_share_are_never_used(hands):
     """The samples do not depend on the rest of a take."""
     share = 0.6
     last = int(FRAMES * share)
@@ -85,10 +85,10 @@ def test_a_model_learns(hands):
     samples = sampler.next_round(None)
     torch.manual_seed(0)
     trainer = Trainer(HAND, samples, replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0))
-    assert trainer.learn(samples) < 0.5, "squared deviations, of which a constant answer leaves one"
+    assert trainer.learn(samples) < 0.5, "a constant answer has a mean squared deviation of one"
 
 
-def test_training_is_the_same_for_the_same_seed(hands, learned):
+def test_the_same_seed_gives_the_same_model(hands, learned):
     again, other = train(hands, TINY), train(hands, replace(TINY, seed=1))
     weights, repeated, others = (
         torch.cat([p.detach().flatten() for p in of.model.parameters()]) for of in (learned, again, other)
@@ -118,7 +118,8 @@ def test_a_quantised_bundle_is_smaller_and_nearly_the_same(hands, tmp_path):
     assert np.abs(ours.infer(rows) - small.infer(rows)).mean() < 0.1 * spread + 1e-3
     sizes = [(tmp_path / name / "manipnet.onnx").stat().st_size for name in ("wide", "small")]
     assert sizes[1] < 0.7 * sizes[0]
-    assert small.meta["quantised_from_sha256"] == ours.model_hash
+    assert small.meta["quantised_from_sha256"] == ours.meta["model_sha256"]
+    assert small.model_hash != ours.model_hash
 
 
 def test_hidden_inputs_do_not_reach_the_network(hands, tmp_path):

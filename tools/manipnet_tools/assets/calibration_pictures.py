@@ -19,7 +19,7 @@ IMAGES, PAGE = HOUSE / "docs" / "images", HOUSE / "server" / "manipnet" / "page"
 PAPER: Final = (0.42, 0.297)
 """A3, landscape, metres."""
 TABLE_M: Final = 0.56
-"""Edge of the square seen in the picture."""
+"""Edge of the square that the picture shows."""
 PIXELS: Final = 520
 FINE: Final = 3
 INK, GREY, RED, GREEN, BLUE = (25, 25, 30), (140, 140, 145), (190, 40, 30), (30, 130, 50), (30, 70, 190)
@@ -28,7 +28,7 @@ SKINS: Final[dict[Side, tuple[int, int, int]]] = {"left": (214, 170, 150), "righ
 
 
 def main() -> None:
-    """Write all."""
+    """Write all pictures and the sheet."""
     from PIL import Image
 
     near = [round(edge / FINE) for edge in (*_pixel(-0.235, -0.165), *_pixel(0.235, 0.275))]
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def panel(moved: Array, title: str = "") -> Any:
-    """The sheet with both hands `moved` from their marks, from above, the operator at the bottom edge."""
+    """Draw the sheet from above, with the operator at the bottom edge and both hands `moved` from their marks."""
     from PIL import Image, ImageDraw, ImageFont
 
     image = Image.new("RGB", (FINE * PIXELS, FINE * PIXELS), (176, 150, 122))
@@ -75,7 +75,7 @@ def _drawn_back() -> Array:
 
 
 def _draw_hand(draw: Any, side: Side, moved: Array) -> None:
-    """A flat hand, lit from above, and the marker cluster on its back."""
+    """Draw a flat hand, lit from above, and the marker cluster on its back."""
     hand = shipped_hand()
     vertices = skinned(hand, *forward_kinematics(hand, np.zeros(hand.angle_count)))
     faces = hand.skin.faces
@@ -86,7 +86,7 @@ def _draw_hand(draw: Any, side: Side, moved: Array) -> None:
     corners, markers = transform(wrist, vertices)[faces], transform(wrist, cluster)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     shades = 0.55 + 0.45 * normals @ LIGHT / np.linalg.norm(normals, axis=1)
-    for k in np.argsort(corners[:, :, 1].mean(axis=1)):  # the highest last
+    for k in np.argsort(corners[:, :, 1].mean(axis=1)):  # the highest is drawn last
         if normals[k, 1] > 0.0:
             color = tuple(round(channel * shades[k]) for channel in SKINS[side])
             draw.polygon([_pixel(x, z) for x, _, z in corners[k]], fill=color)
@@ -110,7 +110,7 @@ def _pixel(x: float, z: float) -> tuple[float, float]:
 
 
 def sheet_svg() -> str:
-    """The sheet at its own size on A3, landscape: millimetres, the operator at the bottom edge."""
+    """The sheet at its real size, in millimetres, for A3 landscape with the operator at the bottom edge."""
     width, height = (1e3 * size for size in PAPER)
     cx, cy, x, z = width / 2, height / 2, 1e3 * MARK_M[0], 1e3 * MARK_M[1]
     parts = [_line(0, cy, width, cy), _text(cx - 60, cy - 3, "centre line"), _line(cx - 8, cy, cx + 8, cy, 1.2)]

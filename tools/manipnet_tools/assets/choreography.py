@@ -1,4 +1,4 @@
-"""Turns the script of a scene into tracks: which hand grasps which object, how, and where the object goes.
+"""Turns the script of a scene into tracks. A script says which hand grasps which object, how, and where it moves it.
 
 Hands are scripted as right hands; a left hand makes the mirror image (through x = 0) of the scripted poses.
 """
@@ -35,7 +35,7 @@ SETTLE_S = 0.3
 
 @dataclass(frozen=True)
 class Rest:
-    """The hand stays at one pose in the world, `wrist (7,)`."""
+    """The hand rests at one pose in the world, `wrist (7,)`."""
 
     start_s: float
     end_s: float
@@ -58,7 +58,7 @@ class Grasp:
 
 
 def hand_pose(fingers: Vector, palm: Vector, p_world: Vector | Array, p_wrist: Vector = (0.0, 0.0, 0.0)) -> Array:
-    """Pose `(7,)` of a right wrist whose fingers and palm face two directions; its point `p_wrist` is at `p_world`."""
+    """Pose `(7,)` of a right wrist with these directions of fingers and palm; its point `p_wrist` is at `p_world`."""
     x = np.array(fingers) / np.linalg.norm(fingers)
     z = x * (np.array(palm) @ x) - np.array(palm)
     z /= np.linalg.norm(z)
@@ -96,7 +96,7 @@ def perform(
 
 
 def _wrist(time_s: Array, side: Side, script: Sequence[Rest | Grasp], tracks: Mapping[str, Array]) -> Array:
-    """Wrist poses `(T, 7)`: fixed to a place or body, and reaching from one to the next in between."""
+    """Wrist poses `(T, 7)`: fixed to a place or a body, and moving from one to the next in between."""
     poses = np.empty((len(time_s), 7))
     held = [_fixed(time_s, side, part, tracks) for part in script]
     for part, track in zip(script, held, strict=True):
@@ -129,7 +129,7 @@ def _reach(side: Side, a: Rest | Grasp, b: Rest | Grasp, start: Array, goal: Arr
 
 
 def _fixed(time_s: Array, side: Side, part: Rest | Grasp, tracks: Mapping[str, Array]) -> Array:
-    """Wrist poses `(T, 7)` as if the hand were at this part of the script all the time."""
+    """Wrist poses `(T, 7)` of a hand that stays at this part of the script all the time."""
     if isinstance(part, Rest):
         wrist = part.wrist if side == "right" else mirror_poses(part.wrist)
         return np.tile(wrist, (len(time_s), 1))
@@ -144,7 +144,7 @@ def _fixed(time_s: Array, side: Side, part: Rest | Grasp, tracks: Mapping[str, A
 
 
 def _carried(time_s: Array, name: str, script: Sequence[Rest | Grasp], moves: Sequence[Move]) -> Array:
-    """Share `(T,)`, 0 to 1, of a hand's tremor that the body has: while the hand holds it off the table."""
+    """Share `(T,)`, 0 to 1, of the hand's tremor that a body takes up while the hand holds it above the table."""
     share = np.zeros(len(time_s))
     for part in script:
         if isinstance(part, Grasp) and part.body == name:

@@ -53,12 +53,12 @@ TABLES: Final[Mapping[str, Callable[[], str]]] = {
 
 
 def with_tables(page: str) -> str:
-    """The text of a page with all its tables as they should be. Raises `KeyError` for a table that does not exist."""
+    """The text of a page with up-to-date tables. Raises `KeyError` for a table that does not exist."""
     return _MARKED.sub(lambda match: f"{match[1]}{TABLES[match[2]]()}{match[3]}", page)
 
 
 def main() -> int:
-    """Rewrite the pages whose tables are stale."""
+    """Rewrite the pages whose tables are out of date."""
     for path in sorted(DOCS.rglob("*.md")):
         before = path.read_text(encoding="utf-8")
         after = with_tables(before)

@@ -17,8 +17,8 @@ _BLEND_PALM_M = 2.5e-3
 _BLEND_FINGER_M = 0.8e-3
 
 _FINGER_RADII_MM = (
-    # at each joint from the root to the tip
-    (14.5, 11.2, 9.2, 6.6),  # thumb: from its MCP's metacarpal end
+    # at each joint from the root to the tip; for the thumb, from the metacarpal end of its MCP joint
+    (14.5, 11.2, 9.2, 6.6),
     (11.4, 9.7, 8.6, 6.2),
     (11.6, 10.0, 9.0, 6.8),
     (11.0, 9.5, 8.5, 6.4),
@@ -27,7 +27,7 @@ _FINGER_RADII_MM = (
 _TIP_BACK_MM = (4.5, 3.6, 3.0, 3.0, 3.4)
 """Distance from the tip joint to the centre of a fingertip, toward the back of the hand."""
 
-# start xyz, end xyz, radii, in millimetres: flesh of the palm that no single bone carries
+# start xyz, end xyz and radii in millimetres: the flesh of the palm that belongs to no single bone
 _WRIST_FLESH = (
     ((-24, 11, -3), (8, 12, -3), 16, 16),  # radial and ulnar side of the wrist
     ((-24, -11, -3), (8, -12, -3), 16, 15),
@@ -92,7 +92,7 @@ class HandShape:
 
 
 def bind_shape(hand: Hand, joints: Array, rotations: Array) -> HandShape:
-    """The flesh about the `joints (J, 3)` of the hand of the dataset's subject; its bones are `rotations (B, 3, 3)`."""
+    """The flesh around the `joints (J, 3)` and bones (`rotations (B, 3, 3)`) of the dataset's subject."""
     palm = [_cone_mm(0, *flesh) for flesh in (*_WRIST_FLESH, *_WEB_FLESH)]
     palm += [_cone_mm(2, *flesh) for flesh in _THENAR_FLESH]
     palm += [_metacarpal(joints[chain[0]], k) for k, chain in enumerate(hand.fingers[1:])]
@@ -101,7 +101,7 @@ def bind_shape(hand: Hand, joints: Array, rotations: Array) -> HandShape:
 
 
 def palmar_directions(hand: Hand, joints: Array, rotations: Array) -> Array:
-    """Unit direction out of the palm side of each bone, `(17, 3)`: where flexion takes the bone."""
+    """Unit directions `(B, 3)` out of the palm side of each bone, toward which flexion moves it."""
     directions = np.tile([0.0, 0.0, -1.0], (hand.bone_count, 1))
     for angle, bone in reversed(list(enumerate(hand.angle_bones))):
         child = int(np.argmax(bone == hand.parents))
@@ -134,7 +134,7 @@ def _cone_mm(bone: int, a: tuple, b: tuple, ra: float, rb: float) -> Cone:
 
 
 def _smooth_minimum(distances: list[Array], width: float) -> Array:
-    """Smooth minimum of `(n,)` arrays over about `width` metres."""
+    """Smooth minimum of `(n,)` arrays that blends over about `width` metres."""
     stack = np.stack(distances)
     low = stack.min(axis=0)
     return low - width * np.log(np.sum(np.exp((low - stack) / width), axis=0))

@@ -1,4 +1,4 @@
-"""Make the skin and the sensors of the shipped hand again: `python -m manipnet_tools.assets.hand_surface`.
+"""Generates the skin and the sensors of the shipped hand: `python -m manipnet_tools.assets.hand_surface`.
 
 It rewrites `hand.npz` of every shipped bundle. A model is trained on its sensors, so changing them makes it unusable.
 """
@@ -28,7 +28,7 @@ PALMAR_COSINE = 0.45
 
 
 def with_surface(hand: Hand) -> Hand:
-    """The hand with a new skin and new sensors about its bones."""
+    """The hand with a new skin and new sensors around its bones."""
     joints, rotations = forward_kinematics(hand, hand.skin.bind_angles)
     shape = bind_shape(hand, joints, rotations)
     low, high = joints.min(axis=0) - 0.05, joints.max(axis=0) + 0.05
@@ -72,7 +72,7 @@ def skin_weights(hand: Hand, shape: HandShape, vertices: Array, faces: NDArray) 
 
 
 def choose_sensors(vertices: Array, normals: Array, weights: Array, palmar: Array, joints: Array) -> NDArray[np.int64]:
-    """Indices of vertices of the palm side, spread evenly by farthest-point sampling from the middle of the palm on."""
+    """Indices of vertices of the palm side, spread evenly by farthest-point sampling, which starts at the palm."""
     facing = np.sum(normals * palmar[weights.argmax(axis=1)], axis=1) > PALMAR_COSINE
     beyond_wrist = vertices[:, 0] > 0.012
     candidates = np.flatnonzero(facing & beyond_wrist)

@@ -1,6 +1,6 @@
-"""Motion like a person's: overlapping point-to-point movements of minimum jerk, and a tremor.
+"""Synthetic human motion: overlapping point-to-point movements of minimum jerk, and a tremor.
 
-A movement adds its displacement, eased in and out, to the motion before it; two that overlap make a smooth curve past
+Each movement adds its displacement, eased in and out, to the previous motion. Two that overlap make a smooth curve past
 the pose between them. Sources: Flash and Hogan 1985 (minimum jerk), Flash and Henis 1991 (superposition).
 """
 
@@ -24,13 +24,13 @@ class Move:
 
 
 def ease(time_s: Array, start_s: float, end_s: float) -> Array:
-    """From 0 to 1 with minimum jerk, at rest at both ends."""
+    """Values `(T,)` that rise from 0 to 1 with minimum jerk, at rest at both ends."""
     u = np.clip((time_s - start_s) / (end_s - start_s), 0.0, 1.0)
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
 def superpose(time_s: Array, start: Array, moves: Sequence[Move]) -> Array:
-    """Poses `(T, 7)` at `time_s (T,)` of a body that starts at rest at `start (7,)` and makes `moves`, in order."""
+    """Poses `(T, 7)` at `time_s (T,)` of a body that starts at rest at `start (7,)` and makes `moves` in order."""
     positions = np.tile(start[:3], (len(time_s), 1))
     rotations = np.tile(start[3:], (len(time_s), 1))
     before = start

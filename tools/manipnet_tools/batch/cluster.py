@@ -16,7 +16,8 @@ from typing import Any, Final
 import ray
 from ray.exceptions import RayError
 
-from manipnet_tools.batch.job import Job, Outcome, do, failure, finished, keep, prepare, take_files
+from manipnet.common.atomic_file import replacing
+from manipnet_tools.batch.job import Job, Outcome, do, failure, finished, prepare, take_files
 from manipnet_tools.batch.local import Progress
 from manipnet_tools.takes.rigged import RigText
 
@@ -24,7 +25,7 @@ OWN: Final = "local"
 """Used instead of an address, this starts a cluster on this machine that lives as long as the batch."""
 OBJECT_STORE_BYTES: Final = 256 << 20
 AHEAD: Final = 2
-"""Jobs that are submitted beyond those that can run at the same time."""
+"""How many more jobs are submitted than can run at the same time."""
 
 Files = dict[str, bytes]
 
@@ -106,8 +107,9 @@ def _next(running: dict[Any, Job]) -> Outcome:
     if outcome.state == "failed":
         return outcome
     try:
-        keep(job.out, npz)
-        keep(job.note, note)
+        for path, content in ((job.out, npz), (job.note, note)):
+            with replacing(path) as file:
+                file.write(content)
     except OSError as error:
         return Outcome(job.name, "failed", reason=str(error))
     return outcome

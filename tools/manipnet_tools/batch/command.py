@@ -12,15 +12,17 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextC
 from rich.table import Table
 from rich.text import Text
 
+from manipnet.common.atomic_file import replacing
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet.tracking.tick import TICK_HZ
-from manipnet_tools.batch.job import Job, Outcome, keep
+from manipnet_tools.batch.job import Job, Outcome
 from manipnet_tools.batch.local import run_locally
 from manipnet_tools.commands.options import BatchOptions
+from manipnet_tools.takes.bvh_folder import bvh_files
 from manipnet_tools.takes.meshes import named_files
 from manipnet_tools.takes.rigged import read_rig
+from manipnet_tools.takes.take import TRACKED_FORMATS
 from manipnet_tools.terminal import open_console
 
 FILE_TAKES = (".csv", ".mcap", ".txt")
@@ -50,7 +52,8 @@ def run(options: BatchOptions) -> None:
     finally:
         outcomes.sort(key=lambda outcome: outcome.name)
         summary = {"model": options.model, "look_ahead_s": options.look_ahead, "takes": [asdict(o) for o in outcomes]}
-        keep(options.out / SUMMARY, json.dumps(summary, indent=2).encode())
+        with replacing(options.out / SUMMARY) as file:
+            file.write(json.dumps(summary, indent=2).encode())
         console.print(table(outcomes))
         if len(outcomes) < len(jobs):
             console.print(f"{len(jobs) - len(outcomes)} takes are left; run the same command again to continue")
@@ -66,10 +69,6 @@ def plan(options: BatchOptions) -> list[Job]:
     Raises `BatchError`, `BundleError`, `MeshError`, `ConfigError` and `TakeError` for options that would make every
     take fail.
     """
-    if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
-        raise BatchError(f"--look-ahead is {options.look_ahead:g} s; allowed are 0 to {MAX_LOOK_AHEAD_S:g}")
-    if options.jobs is not None and options.jobs < 1:
-        raise BatchError(f"--jobs is {options.jobs}; it must be at least 1")
     takes = find_takes(options.folder)
     if not takes:
         raise BatchError(
@@ -81,16 +80,24 @@ def plan(options: BatchOptions) -> list[Job]:
     model, rig = load_bundle(options.model).folder.absolute(), read_rig(options.rig, options.actor)
     names = take_names(options.folder, takes)
     return [
-        Job(name, take.absolute(), meshes, model, options.look_ahead, rig, options.out.absolute() / f"{name}.npz")
+        Job(
+            name,
+            take.absolute(),
+            meshes,
+            model,
+            options.look_ahead,
+            rig,
+            options.out.absolute() / f"{name}.npz",
+            options.up if take.suffix.lower() in TRACKED_FORMATS else "y",
+        )
         for take, name in zip(takes, names, strict=True)
     ]
 
 
 def find_takes(folder: Path) -> list[Path]:
-    """All takes in a folder at any depth, the folder itself included. Raises `BatchError` if there is no folder."""
-    if not folder.is_dir():
-        raise BatchError(f"{folder}: is not a folder; use `manipnet synthesize` for a single take")
-    folders = [place for place in [folder, *folder.rglob("*")] if place.is_dir() and any(place.glob("*Hand.bvh"))]
+    """All takes in a folder at any depth, the folder itself included."""
+    places = [place for place in [folder, *folder.rglob("*")] if place.is_dir()]
+    folders = [place for place in places if any(file.stem.lower().endswith("hand") for file in bvh_files(place))]
     files = [file for file in folder.rglob("*") if file.suffix.lower() in FILE_TAKES and file.is_file()]
     return sorted([*folders, *(file for file in files if file.suffix.lower() != ".txt" or _is_trajectory(file))])
 

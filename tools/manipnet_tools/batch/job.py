@@ -1,4 +1,4 @@
-"""One take of a batch: what its result depends on, and how it is made, on this machine or another."""
+"""One take of a batch: what its result depends on, and how it is synthesised, on this machine or another."""
 
 import hashlib
 import json
@@ -14,6 +14,7 @@ from manipnet.common.atomic_file import replacing
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.commands.synthesize import read_shapes, synthesise, write_arrays
+from manipnet_tools.takes.bvh_folder import bvh_files
 from manipnet_tools.takes.rigged import RiggedTake, RigText, read_rigged
 from manipnet_tools.takes.rollout import tick_take
 from manipnet_tools.takes.take import TakeError
@@ -24,10 +25,10 @@ Advance = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Job:
-    """A take to synthesise, and with what."""
+    """A take to synthesise, with the meshes, the model and the settings to use."""
 
     name: str
-    """The take's name within the batch, after which the result is named."""
+    """The name of the take within the batch, which is also that of its result."""
     take: Path
     meshes: Mapping[str, Path]
     """Mesh files by object, which may include objects that are not in this take."""
@@ -37,11 +38,14 @@ class Job:
     rig: RigText | None
     """The rig file, for a take that does not say which body is which."""
     out: Path
-    """The file to write, .npz. A .json file of the same name says what the result was made from."""
+    """The file to write, .npz. A .json file of the same name holds a hash of everything the result depends on."""
+
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in the take."""
 
     @property
     def note(self) -> Path:
-        """The file that says what the result was made from."""
+        """The .json file beside the result."""
         return self.out.with_name(f"{self.out.stem}.json")
 
 
@@ -69,7 +73,7 @@ class Prepared:
 
 
 def do(job: Job, advance: Advance = lambda done, total: None) -> Outcome:
-    """Synthesise one take unless its result is up to date. An error in a take gives a failed outcome, no exception."""
+    """Synthesise one take unless its result is up to date. An error becomes a failed outcome."""
     start_s = time.monotonic()
     try:
         prepared = prepare(job)
@@ -88,13 +92,13 @@ def prepare(job: Job) -> Prepared:
 
     Raises `TakeError`, `ConfigError`, `BundleError` and `OSError`.
     """
-    rigged = read_rigged(job.take, job.rig)
+    rigged = read_rigged(job.take, job.rig, job.up)
     take, rig_meshes = rigged.take, {} if job.rig is None else job.rig.meshes
     meshes = {name: file for name, file in sorted(job.meshes.items()) if name in take.objects}
     if not meshes and job.meshes and job.take.suffix.lower() != ".mcap" and not rig_meshes:
         objects, given = ", ".join(take.objects) or "none", ", ".join(job.meshes)
         raise TakeError(f"{job.take}: its objects are {objects}, but --mesh names {given}")
-    digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s}".encode())
+    digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s} {job.up}".encode())
     if job.rig is not None:
         digest.update(f"{job.rig.actor} {job.rig.text}".encode())
     of_rig = ((name, file.path) for name, file in sorted(rig_meshes.items()))
@@ -105,7 +109,7 @@ def prepare(job: Job) -> Prepared:
 
 def take_files(take: Path) -> list[Path]:
     """The files that make up a take."""
-    return sorted(take.glob("*.bvh")) if take.is_dir() else [take]
+    return bvh_files(take) if take.is_dir() else [take]
 
 
 def finished(prepared: Prepared) -> Outcome | None:
@@ -117,12 +121,6 @@ def finished(prepared: Prepared) -> Outcome | None:
     except (OSError, ValueError, KeyError, TypeError):
         pass  # the note is missing or cut off, so the result is made again
     return None
-
-
-def keep(path: Path, content: bytes) -> None:
-    """Write a file so that no reader ever sees a part of it. Raises `OSError`."""
-    with replacing(path) as file:
-        file.write(content)
 
 
 def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
@@ -138,12 +136,11 @@ def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
 
     advance(0, total)
     hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count, prepared.rigged.hand_scale)
-    part = job.out.with_name(f"{job.out.name}.part")
-    with part.open("wb") as file:
+    with replacing(job.out) as file:
         write_arrays(file, ticks, shapes, hands)
-    part.replace(job.out)
     outcome = Outcome(job.name, "done", len(ticks.time_s), time.monotonic() - start_s)
-    keep(job.note, json.dumps(asdict(outcome) | {"key": prepared.key}, indent=2).encode())
+    with replacing(job.note) as file:
+        file.write(json.dumps(asdict(outcome) | {"key": prepared.key}, indent=2).encode())
     return outcome
 
 

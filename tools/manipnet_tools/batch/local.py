@@ -4,13 +4,13 @@ When a process dies, because of a crash or for lack of memory, only its current 
 place.
 """
 
-import multiprocessing
 import os
 import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
 
+from manipnet.runtime.child_process import ChildProcess
 from manipnet_tools.batch.job import Job, Outcome, do
 
 END_S = 1.0
@@ -24,12 +24,9 @@ class Worker:
     """A process and its current job."""
 
     def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self.connection, far = context.Pipe()
         self.job: Job | None = None
-        self._process = context.Process(target=_serve, args=(far,), daemon=True)
-        self._process.start()
-        far.close()
+        self._child = ChildProcess("batch", _serve)
+        self.connection = self._child.connection
 
     def begin(self, job: Job) -> "Worker":
         """Start a job; returns this worker, or a new one if the process has died since its last job."""
@@ -43,11 +40,9 @@ class Worker:
 
     def end(self) -> str:
         """End the process, and return how it ended."""
-        self.connection.close()
-        self._process.join(END_S)
-        code = self._process.exitcode
-        self._process.kill()
-        self._process.join()
+        self._child.close(END_S)
+        code = self._child.exit_code
+        self._child.kill()
         return f"killed by {signal.Signals(-code).name}" if code is not None and code < 0 else f"exit status {code}"
 
 
@@ -90,7 +85,6 @@ def _receive(worker: Worker, progress: Progress) -> Outcome | None:
 
 def _serve(connection: Connection) -> None:
     """The process of a worker: do jobs until the other end closes the connection."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     try:
         while True:

@@ -1,4 +1,4 @@
-"""The server's own tick loop without its sockets, fed by a performance and timed stage by stage."""
+"""Times the stages of the server's own tick loop, without its sockets, on the frames of a scenario."""
 
 import gc
 import tempfile
@@ -24,62 +24,62 @@ from manipnet_tools.bench.scenarios import Scenario, actor_config, actor_names, 
 
 WARM_UP_TICKS = 90
 TURN = 10
-"""Ticks, or passes of the reference, in a row before it is another's turn."""
+"""How many ticks, or passes of the reference, are timed in a row before the next one has its turn."""
 STAGES = ("windows", "sense", "infer", "ik", "kinematics", "encode")
-"""In order: buffers to windows, sensors and features, network, pose and solver, joints in the world, messages."""
+"""In order: poses to windows, sensors and features, network, pose and solver, joints in the world, messages."""
 TICK = STAGES[:-1]
 """The stages of a tick: all but the encoding for clients."""
 
 
 class Stopwatch(StageClock):
-    """Takes the place of the server's stage clock: seconds of every stage of the newest tick."""
+    """Replaces the server's stage clock, and keeps the duration of every stage of the latest tick."""
 
     def __init__(self) -> None:
         super().__init__(Timings())
         self.spent_s: dict[str, float] = {}
 
     def start(self) -> None:
-        """A tick begins."""
+        """Begin a tick."""
         self.spent_s = dict.fromkeys(STAGES, 0.0)
         self._since_s = time.perf_counter()
 
     def ended(self, stage: str) -> None:
-        """What was done since the last call belongs to `stage`."""
+        """Add the time since the last call to `stage`."""
         now_s = time.perf_counter()
         self.spent_s[stage] += now_s - self._since_s
         self._since_s = now_s
 
     def begin(self) -> None:
-        """The loop's word for the end of its planning."""
+        """The tick loop calls this when its planning ends."""
         self.ended("windows")
 
 
-class Observed(Synthesizer):
-    """Remembers what it was asked last."""
+class ObservedSynthesizer(Synthesizer):
+    """A synthesizer that keeps its latest inputs."""
 
-    asked: tuple[Sequence[HandScene], Sequence[HandState]] = ((), ())
+    inputs: tuple[Sequence[HandScene], Sequence[HandState]] = ((), ())
 
     def step(self, scenes: Sequence[HandScene], states: Sequence[HandState]) -> list[HandStep]:
-        self.asked = scenes, states
+        self.inputs = scenes, states
         return super().step(scenes, states)
 
 
-class Rig:
-    """A tick loop on a performance, one tick at a time."""
+class TickRunner:
+    """Runs a tick loop on the frames of a scenario, one tick at a time."""
 
-    def __init__(self, bundle: Bundle, performance: Scenario, actors: int = 1) -> None:
+    def __init__(self, bundle: Bundle, scenario: Scenario, actors: int = 1) -> None:
         self.watch = Stopwatch()
-        self.synthesizer = Observed(bundle, on_stage=self.watch.ended)
-        self._frames = endless(performance, actors)
+        self.synthesizer = ObservedSynthesizer(bundle, on_stage=self.watch.ended)
+        self._frames = endless(scenario, actors)
         self._now_s = 0.0
         telemetry = Telemetry()
         telemetry.stages = self.watch
         self._mailbox = Mailbox(telemetry)
-        props = [Prop(name, shape.name, shape) for name, shape in performance.shapes.items()]
+        props = [Prop(name, shape.name, shape) for name, shape in scenario.shapes.items()]
         self._loop = TickLoop(
             "bench",
             [
-                Actor(actor_config(performance, name, actors), props, bundle, telemetry, MAX_LOOK_AHEAD_S)
+                Actor(actor_config(scenario, name, actors), props, bundle, telemetry, MAX_LOOK_AHEAD_S)
                 for name in actor_names(actors)
             ],
             self.synthesizer,
@@ -92,7 +92,7 @@ class Rig:
             self.tick()
 
     def tick(self) -> dict[str, float]:
-        """Take frames in until a tick is due, and step it: seconds by stage."""
+        """Feed frames until a tick is due, and run it. Returns the duration of each stage in seconds."""
         while True:
             self.watch.start()
             if self._loop.step(self._now_s):
@@ -111,23 +111,28 @@ class Rig:
 
 @dataclass(frozen=True)
 class Race:
-    """Seconds of every tick: `stages[rig][stage] (n,)` and of the reference `(n,)`, from rounds of `TURN` each."""
+    """Durations in seconds: `stages[runner][stage] (n,)` of every tick, and `(n,)` of every pass of the reference."""
 
     stages: Mapping[str, Mapping[str, np.ndarray]]
     reference: np.ndarray
 
     def total(self, name: str) -> np.ndarray:
-        """Whole ticks of a rig `(n,)`, seconds, without the encoding for clients."""
+        """Durations `(n,)` of the whole ticks of a runner in seconds, without the encoding for clients."""
         return np.sum([self.stages[name][stage] for stage in TICK], axis=0)
 
     def after_others(self, name: str) -> np.ndarray:
-        """The first tick of every turn: what ran before has filled the caches with something else."""
+        """The first tick of every turn, for which the processor's caches hold the data of other runners."""
         return self.total(name)[::TURN]
 
 
-def race(rigs: Mapping[str, Rig], reference: Callable[[], object], seconds: float, least_rounds: int = 4) -> Race:
-    """Time rigs and reference in short turns: all see the same disturbances, and each mostly finds its own caches."""
-    ticks: dict[str, list[dict[str, float]]] = {name: [] for name in rigs}
+def race(
+    runners: Mapping[str, TickRunner], reference: Callable[[], object], seconds: float, least_rounds: int = 4
+) -> Race:
+    """Time runners and the reference in short turns.
+
+    So all meet the same disturbances, and each mostly finds its own data in the processor's caches.
+    """
+    ticks: dict[str, list[dict[str, float]]] = {name: [] for name in runners}
     passes: list[float] = []
     gc.collect()
     gc.freeze()
@@ -137,28 +142,29 @@ def race(rigs: Mapping[str, Rig], reference: Callable[[], object], seconds: floa
             start_s = time.perf_counter()
             reference()
             passes.append(time.perf_counter() - start_s)
-        for name, rig in rigs.items():
-            ticks[name] += [rig.tick() for _ in range(TURN)]
+        for name, runner in runners.items():
+            ticks[name] += [runner.tick() for _ in range(TURN)]
     gc.unfreeze()
     stages = {
-        name: {stage: np.array([tick[stage] for tick in of_rig]) for stage in STAGES} for name, of_rig in ticks.items()
+        name: {stage: np.array([tick[stage] for tick in of_runner]) for stage in STAGES}
+        for name, of_runner in ticks.items()
     }
     return Race(stages, np.array(passes))
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What ticks ask of the allocator: most bytes held at once beyond those before the tick, and kept after it."""
+    """Bytes that ticks allocate: the most at once beyond those before the tick, and those that are kept after it."""
 
     held_p50: int
     held_max: int
     kept_per_tick: float
 
 
-def memory(rig: Rig, ticks: int = 200) -> Memory:
-    """Trace the allocations of ticks; many times slower than a tick, so never while timing.
+def memory(runner: TickRunner, ticks: int = 200) -> Memory:
+    """Trace the allocations of ticks, which makes them many times slower, so this is never done while timing.
 
-    Frames that come in are among them: they are remembered for two seconds.
+    The frames that arrive count too, because the tick loop keeps them for two seconds.
     """
     tracemalloc.start()
     try:
@@ -167,7 +173,7 @@ def memory(rig: Rig, ticks: int = 200) -> Memory:
         for _ in range(ticks):
             before, _ = tracemalloc.get_traced_memory()
             tracemalloc.reset_peak()
-            rig.tick()
+            runner.tick()
             held.append(tracemalloc.get_traced_memory()[1] - before)
         last, _ = tracemalloc.get_traced_memory()
     finally:

@@ -1,4 +1,4 @@
-"""A real `manipnet-serve` process over its real sockets: when it is ready, what it holds, how late its hands come."""
+"""Measures a real `manipnet-serve` process over its sockets: start, memory, and delay of its hands."""
 
 import os
 import shutil
@@ -27,22 +27,22 @@ from manipnet_tools.bench.scenarios import Scenario, endless
 from manipnet_tools.bench.shapes import gourd
 
 START_S = 300.0
-"""A start on a busy machine that compiles everything."""
+"""Allows for a start that compiles everything on a busy machine."""
 SETTLE_S = 1.0
-"""Hands of the first seconds do not count: the window is not yet full."""
+"""Hands of this first time do not count, because the model's window is not full yet."""
 QUIET_S = 1.0
-"""No hands for this long after the last body: they have all come."""
+"""When no hands arrive for this long after the last body, all have arrived."""
 TOLERANCE_S = 1e-6
 _PORTS = ("port", "input-port", "control-port", "osc-port", "page-port", "web-port")
 
 
 class ServeError(RuntimeError):
-    """The server did not start, or fell silent; the text has its own words."""
+    """The server did not start, or stopped sending; the text quotes its error."""
 
 
 @dataclass(frozen=True)
 class Served:
-    """A server that is ready: its process, its addresses by what they carry, and how long it took."""
+    """A server that is ready: its process, its addresses by what they carry, and how long it took to start."""
 
     process: subprocess.Popen[str]
     addresses: Mapping[str, str]
@@ -51,7 +51,7 @@ class Served:
 
 @contextmanager
 def serving(model: str, meshes: Mapping[str, Path], look_ahead_s: float, cache: Path | None = None) -> Iterator[Served]:
-    """A `manipnet-serve` on free ports, with its own `cache` folder if given. Raises `ServeError`."""
+    """Run `manipnet-serve` on free ports, with its own `cache` folder if one is given. Raises `ServeError`."""
     options = [f"--{port}=0" for port in _PORTS]
     options += [word for name, path in meshes.items() for word in ("--mesh", f"{name}={path}")]
     command = [sys.executable, "-m", "manipnet.cli", *options, "--model", model, "--look-ahead", str(look_ahead_s)]
@@ -68,7 +68,7 @@ def serving(model: str, meshes: Mapping[str, Path], look_ahead_s: float, cache: 
             watchdog.cancel()
             if words[:1] != ["ready"]:
                 errors.seek(0)
-                raise ServeError(f"the server did not get ready: {errors.read().strip() or 'it said nothing'}")
+                raise ServeError(f"the server did not get ready: {errors.read().strip() or 'it printed no error'}")
             reader = threading.Thread(target=_drain, args=(process.stdout,), daemon=True)
             reader.start()
             yield Served(process, dict(zip(words[1::2], words[2::2], strict=True)), ready_s)
@@ -85,7 +85,7 @@ def serving(model: str, meshes: Mapping[str, Path], look_ahead_s: float, cache: 
 
 @dataclass(frozen=True)
 class Starts:
-    """Seconds to `ready` with nothing cached and with everything cached, and MB resident after each."""
+    """Seconds until a server is ready, and its resident MB, with an empty cache (cold) and with a full one (warm)."""
 
     cold_s: float
     warm_s: float
@@ -112,7 +112,7 @@ def starts(model: str, triangles: int = 5000) -> Starts:
 
 @dataclass(frozen=True)
 class EndToEnd:
-    """Seconds from the last packet a tick needed to its hands received `(n,)`, and between publications `(n - 1,)`."""
+    """Seconds `(n,)` from the last packet that a tick needs to its hands, and `(n - 1,)` between publications."""
 
     look_ahead_s: float
     latency_s: np.ndarray
@@ -122,7 +122,7 @@ class EndToEnd:
 
 
 class TimedSender(ZmqBodySender):
-    """Notes when each frame was handed to the socket, on the monotonic clock."""
+    """A sender that keeps the time at which each frame was passed to the socket, on the monotonic clock."""
 
     def __init__(self, host: str, port: int) -> None:
         super().__init__(host, port)
@@ -133,14 +133,14 @@ class TimedSender(ZmqBodySender):
         super().send(frame)
 
 
-def end_to_end(model: str, performance: Scenario, look_ahead_s: float, seconds: float) -> EndToEnd:
-    """Play a performance to a server in real time and receive its hands on the same machine."""
-    with serving(model, performance.meshes, look_ahead_s) as server:
-        received, sent = _perform(server, performance, SETTLE_S + seconds + look_ahead_s)
+def end_to_end(model: str, scenario: Scenario, look_ahead_s: float, seconds: float) -> EndToEnd:
+    """Play a scenario to a server in real time, and receive its hands on the same machine."""
+    with serving(model, scenario.meshes, look_ahead_s) as server:
+        received, sent = _perform(server, scenario, SETTLE_S + seconds + look_ahead_s)
         size = resident_mb(server.process.pid)
     counted = [hands for hands in received if hands.t_capture_s >= SETTLE_S]
     if len(counted) < 2:
-        raise ServeError(f"only {len(received)} hands messages came in {seconds:g} s")
+        raise ServeError(f"only {len(received)} hands messages arrived within {seconds:g} s")
     return EndToEnd(
         look_ahead_s,
         _latencies(counted, sent, look_ahead_s),
@@ -151,8 +151,8 @@ def end_to_end(model: str, performance: Scenario, look_ahead_s: float, seconds: 
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
-    """What is kept of a hands message, and when it came."""
+class ReceivedHands:
+    """The times of a hands message, and when it arrived."""
 
     seq: int
     t_capture_s: float
@@ -160,15 +160,17 @@ class Received:
     at_s: float
 
 
-def _read(payload: bytes, at_s: float) -> Received:
+def _read(payload: bytes, at_s: float) -> ReceivedHands:
     message = msgpack.unpackb(payload)
-    return Received(message["seq"], message["t_capture"], message["t_publish"], at_s)
+    return ReceivedHands(message["seq"], message["t_capture"], message["t_publish"], at_s)
 
 
-def _perform(server: Served, performance: Scenario, seconds: float) -> tuple[list[Received], list[tuple[float, float]]]:
+def _perform(
+    server: Served, scenario: Scenario, seconds: float
+) -> tuple[list[ReceivedHands], list[tuple[float, float]]]:
     host, _, port = server.addresses["bodies"].removeprefix("tcp://").rpartition(":")
-    frames = takewhile(lambda frame: frame.t_s <= seconds, endless(performance))
-    received: list[Received] = []
+    frames = takewhile(lambda frame: frame.t_s <= seconds, endless(scenario))
+    received: list[ReceivedHands] = []
     with zmq.Context() as context, context.socket(zmq.SUB) as hands:
         hands.setsockopt(zmq.RCVHWM, 0)
         hands.setsockopt(zmq.RCVTIMEO, int(1e3 * (QUIET_S + SETTLE_S)))
@@ -178,7 +180,7 @@ def _perform(server: Served, performance: Scenario, seconds: float) -> tuple[lis
         thread = threading.Thread(target=_play, args=(frames, sender))
         thread.start()
         try:
-            # hands go on when bodies stop, held: the last frame ends the performance
+            # the server goes on sending held hands after the last frame, so the end of the player ends the loop
             while thread.is_alive():
                 with suppress(zmq.Again):
                     received.append(_read(hands.recv()[len(TOPIC_MSGPACK) :], time.monotonic()))
@@ -192,18 +194,18 @@ def _play(frames: Iterable[BodyFrame], sender: TimedSender) -> None:
     play(frames, sender)
 
 
-def _latencies(messages: Iterable[Received], sent: list[tuple[float, float]], look_ahead_s: float) -> np.ndarray:
-    """From the first frame at or after what a tick looks ahead to, to its message; frames are at rising times."""
-    times_s, handed_s = np.array(sent).T
+def _latencies(messages: Iterable[ReceivedHands], sent: list[tuple[float, float]], look_ahead_s: float) -> np.ndarray:
+    """Seconds from sending the first frame that completes the look-ahead of a tick until its hands arrive."""
+    times_s, passed_s = np.array(sent).T
     latencies = []
     for hands in messages:
         needed = int(np.searchsorted(times_s, hands.t_capture_s + look_ahead_s - TOLERANCE_S))
         if needed < len(times_s):
-            latencies.append(hands.at_s - handed_s[needed])
+            latencies.append(hands.at_s - passed_s[needed])
     return np.array(latencies)
 
 
 def _drain(lines: Iterable[str]) -> None:
-    with suppress(ValueError):  # closed under us at the end
+    with suppress(ValueError):  # the pipe is closed at the end
         for _ in lines:
             pass

@@ -1,4 +1,4 @@
-"""On what, and beside what, something was measured: absolute times mean nothing without it."""
+"""Describes the machine of a measurement and its load, without which absolute times mean nothing."""
 
 import os
 import platform
@@ -19,7 +19,7 @@ class Machine:
     python: str
     onnxruntime: str
     busy: float | None
-    """Processes that wanted a core over the last minute, before the measurement; None where the system does not say."""
+    """Mean number of processes that wanted a core in the minute before; None if the system does not report it."""
     date: str
 
     def __str__(self) -> str:
@@ -28,7 +28,7 @@ class Machine:
 
 
 def this_machine() -> Machine:
-    """The machine this runs on, now."""
+    """This machine, now."""
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     return Machine(
         _processor(),
@@ -42,7 +42,7 @@ def this_machine() -> Machine:
 
 
 def resident_mb(process_id: int) -> float | None:
-    """Resident memory of a process in MB; None where the system has no /proc."""
+    """Resident memory of a process in MB; None on a system without /proc."""
     try:
         status = Path(f"/proc/{process_id}/status").read_text(encoding="ascii")
     except OSError:

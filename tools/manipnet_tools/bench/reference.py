@@ -1,4 +1,4 @@
-"""What everything is measured against: the paper's network alone, 1536 wide, single precision, one thread."""
+"""The reference of all ratios: the paper's network alone, 1536 wide, in single precision and on one thread."""
 
 from collections.abc import Callable
 
@@ -16,9 +16,10 @@ HANDS = 2
 
 
 def full_graph(hand: Hand, rest_angles: np.ndarray, width: int = WIDTH) -> bytes:
-    """The network of the paper as ONNX with random weights, answering nearly the pose of `rest_angles (A,)`.
+    """The network of the paper as ONNX, with random weights and outputs close to the pose of `rest_angles (A,)`.
 
-    Three linear encoders, two residual dense blocks, a linear decoder, normalisation before and after. Needs onnx.
+    It has three linear encoders, two residual dense blocks and a linear decoder, with normalisation before and after.
+    Raises `ModuleNotFoundError` if onnx is not installed.
     """
     import onnx
     from onnx import TensorProto, helper, numpy_helper
@@ -68,13 +69,13 @@ def full_graph(hand: Hand, rest_angles: np.ndarray, width: int = WIDTH) -> bytes
 
 
 def _answer(hand: Hand, angles: np.ndarray) -> np.ndarray:
-    """Outputs `(output_size,)` that mean a pose 2 cm from everything."""
+    """Outputs `(output_size,)` for a pose that is 2 cm away from every surface."""
     positions, rotations = forward_kinematics(hand, angles[None])
     return pose_outputs(hand, positions, rotations, np.full((1, hand.joint_count), 0.02))[0]
 
 
 def forward_pass(content: bytes, layout: Layout) -> Callable[[], object]:
-    """One run of a graph alone for two hands on one thread, on features that never change."""
+    """A function that runs a graph once, for two hands, on one thread and always with the same features."""
     session: onnxruntime.InferenceSession = open_session("reference", content, layout)
     rows = np.random.default_rng(1).normal(size=(HANDS, layout.input_size)).astype(np.float32)
     return lambda: session.run(None, {"features": rows})

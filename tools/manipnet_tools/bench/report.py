@@ -1,4 +1,4 @@
-"""The figures of a run as tables a person reads, and as verdicts on what was asked of them."""
+"""Prints the figures of a run as tables, and compares them with the goals."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ _SHOWN = ("sense", "infer", "ik")
 
 
 @dataclass(frozen=True)
-class Limit:
-    """What is asked: a figure's place in the results, its bound, and whether it must reach it instead."""
+class Goal:
+    """A figure's place in the results, and the bound that it must not exceed, or must reach if `at_least`."""
 
     what: str
     place: tuple[str, ...]
@@ -22,32 +22,32 @@ class Limit:
     at_least: bool = False
 
 
-TARGETS = (
-    Limit("tick, chosen model: p50", ("tick", "total", "p50"), 0.5),
-    Limit("tick, chosen model: p99", ("tick", "total", "p99"), 1.0),
-    Limit("tick at 5k triangles: p50", ("triangles", "5000", "total", "p50"), 0.5),
-    Limit("tick at 5k triangles: p99", ("triangles", "5000", "total", "p99"), 1.0),
-    Limit("tick, full width quantised: p50", ("models", "quantised", "total", "p50"), 0.6),
-    Limit("tick, full width quantised: p99", ("models", "quantised", "total", "p99"), 1.2),
-    Limit("sensors: p50", ("tick", "sense", "p50"), 0.2),
-    Limit("inverse kinematics: p50", ("tick", "ik", "p50"), 0.1),
-    Limit("200k triangles over 5k", ("ratios", "200k triangles"), 1.3),
-    Limit("8 actors over 1", ("ratios", "8 actors"), 3.0),
-    Limit("straightforward version over ours", ("straightforward", "times"), 20.0, at_least=True),
-    Limit("end to end beyond look-ahead 0.5 s: p99", ("live", "0.5", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
-    Limit("end to end beyond look-ahead 0.1 s: p99", ("live", "0.1", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
-    Limit("published interval: p99", ("live", "0.5", "interval", "p99_ms"), 18.5, "ms"),
-    Limit("hands missing", ("live", "0.5", "missing"), 0.0, ""),
-    Limit("ready, warm cache", ("start", "warm_s"), 3.0, "s"),
-    Limit("ready, empty cache", ("start", "cold_s"), 12.0, "s"),
-    Limit("ten minutes, published interval: p99", ("minutes", "interval", "p99_ms"), 18.5, "ms"),
-    Limit("ten minutes, hands missing", ("minutes", "missing"), 0.0, ""),
-    Limit("resident memory, one actor", ("live", "0.5", "resident_mb"), 350.0, "MB"),
+GOALS = (
+    Goal("tick, chosen model: p50", ("tick", "total", "p50"), 0.5),
+    Goal("tick, chosen model: p99", ("tick", "total", "p99"), 1.0),
+    Goal("tick at 5k triangles: p50", ("triangles", "5000", "total", "p50"), 0.5),
+    Goal("tick at 5k triangles: p99", ("triangles", "5000", "total", "p99"), 1.0),
+    Goal("tick, full width quantised: p50", ("models", "quantised", "total", "p50"), 0.6),
+    Goal("tick, full width quantised: p99", ("models", "quantised", "total", "p99"), 1.2),
+    Goal("sensors: p50", ("tick", "sense", "p50"), 0.2),
+    Goal("inverse kinematics: p50", ("tick", "ik", "p50"), 0.1),
+    Goal("200k triangles over 5k", ("ratios", "200k triangles"), 1.3),
+    Goal("8 actors over 1", ("ratios", "8 actors"), 3.0),
+    Goal("straightforward version over ours", ("straightforward", "times"), 20.0, at_least=True),
+    Goal("end to end beyond look-ahead 0.5 s: p99", ("live", "0.5", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
+    Goal("end to end beyond look-ahead 0.1 s: p99", ("live", "0.1", "latency", "p99_ms"), 1e3 / 60.0, "ms"),
+    Goal("published interval: p99", ("live", "0.5", "interval", "p99_ms"), 18.5, "ms"),
+    Goal("hands missing", ("live", "0.5", "missing"), 0.0, ""),
+    Goal("ready, warm cache", ("start", "warm_s"), 3.0, "s"),
+    Goal("ready, empty cache", ("start", "cold_s"), 12.0, "s"),
+    Goal("ten minutes, published interval: p99", ("minutes", "interval", "p99_ms"), 18.5, "ms"),
+    Goal("ten minutes, hands missing", ("minutes", "missing"), 0.0, ""),
+    Goal("resident memory, one actor", ("live", "0.5", "resident_mb"), 350.0, "MB"),
 )
 
 
 def with_ratios(figures: Figures) -> Figures:
-    """The figures with those that compare two of them."""
+    """The figures, with the ratios of some of them added."""
     ratios = {}
     for name, section, one, other in (
         ("200k triangles", "triangles", "200000", "5000"),
@@ -59,12 +59,12 @@ def with_ratios(figures: Figures) -> Figures:
     return figures | {"ratios": ratios}
 
 
-def verdicts(figures: Figures) -> list[tuple[Limit, float, bool]]:
-    """Every target that was measured, its figure, and whether it is met."""
-    found = [(target, _find(figures, target.place)) for target in TARGETS]
+def verdicts(figures: Figures) -> list[tuple[Goal, float, bool]]:
+    """Every goal that was measured, with its figure and whether it is met."""
+    found = [(goal, _find(figures, goal.place)) for goal in GOALS]
     return [
-        (target, value, value >= target.bound if target.at_least else value <= target.bound)
-        for target, value in found
+        (goal, value, value >= goal.bound if goal.at_least else value <= goal.bound)
+        for goal, value in found
         if value is not None
     ]
 
@@ -79,7 +79,7 @@ def _find(figures: Figures, place: Iterable[str]) -> float | None:
 
 
 def lines(figures: Figures, machine: Machine, about: str) -> Iterator[str]:
-    """The report. Milliseconds are this machine's; ratios are to the reference's p50 of the same section."""
+    """The lines of the report. Ratios are relative to the median of the reference in the same section."""
     yield f"{machine}"
     yield f"{about}; reference: the 1536 wide network alone, single precision, two hands, one thread"
     if "total" in figures.get("tick", {}):
@@ -89,9 +89,9 @@ def lines(figures: Figures, machine: Machine, about: str) -> Iterator[str]:
     yield from _straightforward(figures.get("straightforward", {}))
     yield from _process(figures)
     yield ""
-    for target, value, met in verdicts(figures):
-        sign = ">=" if target.at_least else "<="
-        yield f"{'met   ' if met else 'MISSED'}  {target.what:42} {value:9.3g} {sign} {target.bound:.3g} {target.unit}"
+    for goal, value, met in verdicts(figures):
+        sign = ">=" if goal.at_least else "<="
+        yield f"{'met   ' if met else 'MISSED'}  {goal.what:42} {value:9.3g} {sign} {goal.bound:.3g} {goal.unit}"
 
 
 def _stages(tick: Figures) -> Iterator[str]:

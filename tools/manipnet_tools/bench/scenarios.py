@@ -1,4 +1,4 @@
-"""What is synthesised while it is timed: the bundled demo or any take, for any number of actors, without an end."""
+"""The motion on which ticks are timed: the bundled demo or any take, without an end, for any number of actors."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,12 +13,12 @@ from manipnet_tools.commands.replay import take_frames
 from manipnet_tools.takes.take import TakeError, read_take
 
 APART = 0.37
-"""Share of the performance by which each actor is ahead of the one before, so that they do different things."""
+"""Each actor is ahead of the previous one by this share of the scenario, so that no two do the same."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """Frames at an even rate, and the mesh file and shape of every prop in them."""
+    """Frames at a constant rate, and the mesh file and shape of every prop in them."""
 
     name: str
     rate_hz: float
@@ -27,18 +27,18 @@ class Scenario:
     shapes: Mapping[str, Shape]
 
     def with_shape(self, shape: Shape) -> "Scenario":
-        """The same motion with every prop of another shape."""
+        """The same motion with another shape for every prop."""
         return replace(self, shapes=dict.fromkeys(self.shapes, shape))
 
     @property
     def triangles(self) -> str:
-        """How many triangles its props have."""
+        """The numbers of triangles of its props, as text."""
         counts = sorted({len(shape.mesh.faces) for shape in self.shapes.values()})
         return f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
 
 
 def demo() -> Scenario:
-    """What `manipnet-serve --demo` plays."""
+    """The recording that `manipnet-serve --demo` plays."""
     return take(DEMO_FILE, {name: LIBRARY_FOLDER / f"{name}.ply" for name in DEMO_OBJECTS})
 
 
@@ -53,23 +53,23 @@ def take(path: Path, meshes: Mapping[str, Path]) -> Scenario:
 
 
 def actor_names(actors: int) -> list[str]:
-    """Names of so many actors."""
+    """Names for a number of actors."""
     return [f"actor{i}" for i in range(actors)]
 
 
-def actor_config(performance: Scenario, name: str, actors: int) -> ActorConfig:
-    """One of `actors` performers, whose bodies are named as `endless` names them."""
+def actor_config(scenario: Scenario, name: str, actors: int) -> ActorConfig:
+    """The configuration of one of several actors, for bodies with the names that `endless` gives them."""
     prefix = _prefix(name, actors)
     return ActorConfig(
         name,
         {wrist: BodyConfig(prefix + wrist) for wrist in WRISTS},
-        tuple(ObjectConfig(thing, BodyConfig(prefix + thing), path) for thing, path in performance.meshes.items()),
+        tuple(ObjectConfig(thing, BodyConfig(prefix + thing), path) for thing, path in scenario.meshes.items()),
     )
 
 
-def endless(performance: Scenario, actors: int = 1) -> Iterator[BodyFrame]:
-    """The frames forth and back for ever, so that nothing jumps, with the bodies of every actor in each."""
-    frames = performance.frames
+def endless(scenario: Scenario, actors: int = 1) -> Iterator[BodyFrame]:
+    """Yield the frames forward and backward for ever, so that nothing jumps. Each has the bodies of all actors."""
+    frames = scenario.frames
     names = actor_names(actors)
     ahead = [round(i * APART * len(frames)) for i in range(actors)]
     k = 0
@@ -79,8 +79,8 @@ def endless(performance: Scenario, actors: int = 1) -> Iterator[BodyFrame]:
             for name, shift in zip(names, ahead, strict=True)
             for body in frames[_bounced(k + shift, len(frames))].bodies
         )
-        t_s = k / performance.rate_hz
-        yield BodyFrame(t_s, k, bodies, t_s, "bench:performance")
+        t_s = k / scenario.rate_hz
+        yield BodyFrame(t_s, k, bodies, t_s, "bench:scenario")
         k += 1
 
 

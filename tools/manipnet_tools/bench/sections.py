@@ -1,13 +1,13 @@
-"""What `manipnet bench` measures, section by section: each adds its figures to a plain dictionary."""
+"""The sections of `manipnet bench`. Each measures one subject, and returns its figures as a plain dictionary."""
 
 import importlib.util
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.features import features
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import windows_of
-from manipnet_tools.bench.harness import STAGES, Race, Rig, memory, race
+from manipnet_tools.bench.harness import STAGES, Race, TickRunner, memory, race
 from manipnet_tools.bench.live import end_to_end, serving, starts
 from manipnet_tools.bench.models import FullWidth, apart_m, quantised, shipped_full_width
+from manipnet_tools.bench.options import Section
 from manipnet_tools.bench.reference import WIDTH
 from manipnet_tools.bench.scenarios import Scenario
 from manipnet_tools.bench.shapes import gourd
@@ -27,23 +28,23 @@ ACTORS = (1, 2, 4, 8, 16)
 LOOK_AHEADS_S = (0.5, 0.1)
 TEN_MINUTES_S = 600.0
 STRAIGHTFORWARD = Path(__file__).parents[3] / "benchmarks" / "straightforward.py"
-"""Not part of an installed package: only a checkout has it."""
+"""Only a checkout has this file; an installed package does not."""
 
 Figures = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What is measured, and with what."""
+    """What the sections measure, and the reference that they compare it with."""
 
     bundle: Bundle
-    performance: Scenario
+    scenario: Scenario
     full: FullWidth
     reference: Callable[[], object]
     seconds: float
-    """Of timing in all; building, starting and tracing come on top."""
+    """Total time of the timed parts; building, starting and tracing take more."""
     beside: tuple[Bundle, ...] = ()
-    """More models whose ticks are timed."""
+    """Further models whose ticks are timed."""
 
 
 def percentiles(seconds: np.ndarray) -> Figures:
@@ -53,7 +54,7 @@ def percentiles(seconds: np.ndarray) -> Figures:
 
 
 def _raced(result: Race, name: str) -> Figures:
-    """Percentiles of a rig's whole ticks and of its stages, and both over the reference's p50."""
+    """Percentiles of a runner's ticks and of their stages, and their ratios to the median of the reference."""
     p50 = float(np.median(1e3 * result.reference))
     figures = {stage: percentiles(result.stages[name][stage]) for stage in STAGES}
     figures["total"] = percentiles(result.total(name))
@@ -64,35 +65,35 @@ def _raced(result: Race, name: str) -> Figures:
 
 
 def tick(bench: Bench) -> Figures:
-    """The tick of the chosen model, stage by stage, and what it asks of the allocator."""
-    rig = Rig(bench.bundle, bench.performance)
-    figures = _raced(race({"tick": rig}, bench.reference, 0.25 * bench.seconds), "tick")
-    return figures | {"memory": asdict(memory(rig)), "triangles": bench.performance.triangles}
+    """The tick of the chosen model, stage by stage, and the memory that it allocates."""
+    runner = TickRunner(bench.bundle, bench.scenario)
+    figures = _raced(race({"tick": runner}, bench.reference, 0.25 * bench.seconds), "tick")
+    return figures | {"memory": asdict(memory(runner)), "triangles": bench.scenario.triangles}
 
 
 def models(bench: Bench) -> Figures:
-    """The same tick with the paper's width, in single precision and quantised, and with what else was asked for.
+    """The same tick with the paper's width, in single precision and quantised, and with the models given to compare.
 
-    Quantised is the shipped full-width bundle, or random weights where there is none.
+    The quantised model is the shipped full-width bundle, or has random weights if none is shipped.
     """
     try:
         random = quantised(bench.full)
     except ModuleNotFoundError as error:
-        return {"skipped": f"{error.name} is not installed: it makes the 8-bit weights"}
+        return {"skipped": f"{error.name} is not installed, which quantises the weights"}
     shipped = shipped_full_width()
     bundles = {"single": bench.full.bundle, "quantised": shipped or random} | {b.name: b for b in bench.beside}
-    rigs = {name: Rig(bundle, bench.performance) for name, bundle in bundles.items()}
-    result = race(rigs, bench.reference, 0.15 * bench.seconds)
-    rows = np.concatenate([_asked_features(rigs["single"]) for _ in range(30) if rigs["single"].tick()])
-    return {name: _raced(result, name) for name in rigs} | {
+    runners = {name: TickRunner(bundle, bench.scenario) for name, bundle in bundles.items()}
+    result = race(runners, bench.reference, 0.15 * bench.seconds)
+    rows = np.concatenate([_features_of(runners["single"]) for _ in range(30) if runners["single"].tick()])
+    return {name: _raced(result, name) for name in runners} | {
         "weights": "random" if shipped is None else "shipped",
         "quantised_apart_mm": 1e3 * apart_m(bench.full.bundle, random, rows),
     }
 
 
-def _asked_features(rig: Rig) -> np.ndarray:
-    scenes, states = rig.synthesizer.asked
-    hand = rig.synthesizer.hand
+def _features_of(runner: TickRunner) -> np.ndarray:
+    scenes, states = runner.synthesizer.inputs
+    hand = runner.synthesizer.hand
     rows = [
         features(hand, scene.shape, windows_of([scene]), state.positions[None], state.rotations[None])
         for scene, state in zip(scenes, states, strict=True)
@@ -101,36 +102,38 @@ def _asked_features(rig: Rig) -> np.ndarray:
 
 
 def triangles(bench: Bench) -> Figures:
-    """The same tick with every prop a gourd of 12 … 200,000 triangles."""
+    """The same tick with props of 12 to 200,000 triangles, all shaped like a gourd."""
     shapes = {count: build_shape(gourd(count)) for count in TRIANGLES}
-    rigs = {str(count): Rig(bench.bundle, bench.performance.with_shape(shape)) for count, shape in shapes.items()}
-    result = race(rigs, bench.reference, 0.15 * bench.seconds)
-    return {name: _raced(result, name) | {"triangles": len(shapes[int(name)].mesh.faces)} for name in rigs}
+    runners = {
+        str(count): TickRunner(bench.bundle, bench.scenario.with_shape(shape)) for count, shape in shapes.items()
+    }
+    result = race(runners, bench.reference, 0.15 * bench.seconds)
+    return {name: _raced(result, name) | {"triangles": len(shapes[int(name)].mesh.faces)} for name in runners}
 
 
 def actors(bench: Bench) -> Figures:
-    """1 … 16 actors, both hands of each, as one batch."""
-    rigs = {str(count): Rig(bench.bundle, bench.performance, count) for count in ACTORS}
-    result = race(rigs, bench.reference, 0.2 * bench.seconds)
-    return {name: _raced(result, name) for name in rigs}
+    """The tick of 1 to 16 actors, whose hands are synthesised in one batch."""
+    runners = {str(count): TickRunner(bench.bundle, bench.scenario, count) for count in ACTORS}
+    result = race(runners, bench.reference, 0.2 * bench.seconds)
+    return {name: _raced(result, name) for name in runners}
 
 
 def straightforward(bench: Bench) -> Figures:
-    """A tick of the version one would first write, full width, on the same hands; ours beside it."""
+    """A tick of the straightforward version at full width, and ours, on the same hands."""
     if not STRAIGHTFORWARD.is_file():
         return {"skipped": "benchmarks/straightforward.py is only in a checkout"}
     try:
         module = _load(STRAIGHTFORWARD)
     except ModuleNotFoundError as error:
         return {"skipped": f"{error.name} is not installed"}
-    rig, theirs, ours = Rig(bench.bundle, bench.performance), [], []
+    runner, theirs, ours = TickRunner(bench.bundle, bench.scenario), [], []
     slow: dict[int, Any] = {}
     end_s = time.perf_counter() + 0.1 * bench.seconds
     while time.perf_counter() < end_s or len(theirs) < 3:
-        ours += [sum(spent for stage, spent in rig.tick().items() if stage != "encode") for _ in range(60)]
-        scenes, states = rig.synthesizer.asked
+        ours += [sum(spent for stage, spent in runner.tick().items() if stage != "encode") for _ in range(60)]
+        scenes, states = runner.synthesizer.inputs
         if len({id(scene.shape) for scene in scenes}) != 1 or len(scenes) != 2:
-            continue  # it is about one mesh and two hands
+            continue  # the straightforward version handles one mesh and two hands
         mesh = scenes[0].shape.mesh
         version = slow.setdefault(id(mesh), module.Straightforward(mesh.vertices, mesh.faces, WIDTH))
         version.tick(scenes, states)
@@ -151,24 +154,24 @@ def _load(path: Path) -> ModuleType:
 
 
 def start(bench: Bench) -> Figures:
-    """A real server's way to `ready`, with an empty cache and a full one."""
+    """The start of a real server, with an empty cache and with a full one."""
     return asdict(starts(_model(bench)))
 
 
 def live(bench: Bench) -> Figures:
-    """A real server over its real sockets, at two look-aheads, with a warm cache."""
-    with serving(_model(bench), bench.performance.meshes, LOOK_AHEADS_S[0]):
+    """A real server over its sockets, at two look-aheads, with a full cache."""
+    with serving(_model(bench), bench.scenario.meshes, LOOK_AHEADS_S[0]):
         pass
     return {str(look_ahead_s): _served(bench, look_ahead_s, 0.15 * bench.seconds) for look_ahead_s in LOOK_AHEADS_S}
 
 
 def minutes(bench: Bench) -> Figures:
-    """The same for ten minutes."""
+    """A real server over its sockets for ten minutes."""
     return _served(bench, LOOK_AHEADS_S[0], TEN_MINUTES_S)
 
 
 def _served(bench: Bench, look_ahead_s: float, seconds: float) -> Figures:
-    result = end_to_end(_model(bench), bench.performance, look_ahead_s, seconds)
+    result = end_to_end(_model(bench), bench.scenario, look_ahead_s, seconds)
     return {
         "latency": percentiles(result.latency_s),
         "interval": percentiles(result.interval_s),
@@ -183,7 +186,7 @@ def _model(bench: Bench) -> str:
     return str(bench.bundle.folder)
 
 
-SECTIONS: dict[str, Callable[[Bench], Figures]] = {
+MEASURED: Final[Mapping[Section, Callable[[Bench], Figures]]] = {
     "tick": tick,
     "models": models,
     "triangles": triangles,
@@ -193,5 +196,4 @@ SECTIONS: dict[str, Callable[[Bench], Figures]] = {
     "live": live,
     "minutes": minutes,
 }
-USUAL = tuple(name for name in SECTIONS if name != "minutes")
-"""What is measured where nothing is named."""
+"""What measures each section."""

@@ -1,4 +1,4 @@
-"""A closed shape in any number of triangles, to see what their number costs."""
+"""A closed shape with any number of triangles, to measure what triangles cost."""
 
 import numpy as np
 
@@ -10,12 +10,13 @@ FEWEST = 12
 
 
 def gourd(triangles: int) -> ClosedMesh:
-    """A solid of revolution about Y with a waist, as large as a jar, in about `triangles` triangles (12 or more).
+    """A solid of revolution about Y with a waist, as large as a jar, with about `triangles` triangles.
 
-    The same surface at every number, sampled on rings of equal size from pole to pole.
+    The surface is always the same; the triangles are on rings of equal size from pole to pole. Raises `ValueError` for
+    fewer than 12.
     """
     if triangles < FEWEST:
-        raise ValueError(f"{triangles} triangles; the fewest are {FEWEST}")
+        raise ValueError(f"{triangles} triangles were requested; at least {FEWEST} are needed")
     sectors = max(round(np.sqrt(triangles / 2.0)), 3)
     rings = round(triangles / (2.0 * sectors)) + 1
     along = np.arange(1, rings) / rings

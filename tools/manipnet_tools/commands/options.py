@@ -1,15 +1,29 @@
 """Options of the verbs that work with takes and servers.
 
-They are apart from the verbs, whose libraries take a second to load, so that `--help` is quick.
+They are apart from the verbs, whose libraries take a second to load, so that `--help` is quick. The method `check` of
+each raises `ConfigError` or `BundleError` for values that cannot be used, also without loading a library.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
+from manipnet.common.options import ConfigError
+from manipnet.config.files import require_file
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.commands.checks import (
+    require_folder_of,
+    require_look_ahead,
+    require_meshes,
+    require_new_file,
+    require_take,
+)
+
+SPEEDS: Final = (0.01, 100.0)
+EXPORT_SUFFIXES: Final = {"gltf": (".glb", ".gltf"), "csv": (".csv",)}
 
 
 def _optional(metavar: str) -> Any:
@@ -31,6 +45,13 @@ class ReplayOptions:
     """Repeat until stopped; the time stamps keep rising."""
     rate: Annotated[float | None, _optional("HZ")] = None
     """Resample to this rate; by default the take keeps its own."""
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in a Motive CSV or a recording; the file does not say which."""
+
+    def check(self) -> None:
+        require_take(self.take)
+        if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
+            raise ConfigError(f"--speed is {self.speed:g}; allowed are {SPEEDS[0]:g} to {SPEEDS[1]:g}")
 
 
 @dataclass(frozen=True)
@@ -59,6 +80,11 @@ class RecordOptions:
     seconds: Annotated[float | None, _optional("SECONDS")] = None
     """Stop after this time."""
 
+    def check(self) -> None:
+        require_new_file(self.out)
+        require_file(self.rig)
+        require_file(self.keys)
+
 
 @dataclass(frozen=True)
 class RecoverOptions:
@@ -68,6 +94,10 @@ class RecoverOptions:
     """The recording to read."""
     out: Annotated[Path, arg(metavar="FILE")]
     """The file to write; it must not exist."""
+
+    def check(self) -> None:
+        require_file(self.recording)
+        require_new_file(self.out)
 
 
 @dataclass(frozen=True)
@@ -88,6 +118,16 @@ class SynthesizeOptions:
     """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in a Motive CSV or a recording; the file does not say which."""
+
+    def check(self) -> None:
+        require_take(self.take)
+        require_folder_of(self.out)
+        require_meshes(self.mesh)
+        find_bundle(self.model)
+        require_look_ahead(self.look_ahead)
+        require_file(self.rig)
 
 
 @dataclass(frozen=True)
@@ -112,10 +152,22 @@ class BatchOptions:
     """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
+    up: Literal["y", "z"] = "y"
+    """The axis that points up in a Motive CSV or a recording; the file does not say which."""
     jobs: Annotated[int | None, _optional("N")] = None
     """Number of takes at the same time on this machine; by default one per processor."""
     ray: Annotated[str | None, _optional("ADDRESS")] = None
     """Work on a Ray cluster instead: HOST:PORT, auto for the one on this machine, or local to start one here."""
+
+    def check(self) -> None:
+        if not self.folder.is_dir():
+            raise ConfigError(f"{self.folder}: is not a folder; use `manipnet synthesize` for a single take")
+        require_meshes(self.mesh)
+        find_bundle(self.model)
+        require_look_ahead(self.look_ahead)
+        require_file(self.rig)
+        if self.jobs is not None and self.jobs < 1:
+            raise ConfigError(f"--jobs is {self.jobs}; it must be at least 1")
 
 
 @dataclass(frozen=True)
@@ -138,6 +190,17 @@ class ExportOptions:
     """The actor whose hands to write, if a recording has several; by default the first."""
     right_handed: bool = False
     """bvh: write right-handed centimetres, for Blender and Maya, instead of the dataset's left-handed decimetres."""
+
+    def check(self) -> None:
+        if not self.source.is_dir():
+            require_file(self.source)
+        require_folder_of(self.out)
+        require_meshes(self.mesh)
+        suffixes = EXPORT_SUFFIXES.get(self.format, ())
+        if suffixes and self.out.suffix.lower() not in suffixes:
+            raise ConfigError(f"--out {self.out}: for --format {self.format} it must end in {' or '.join(suffixes)}")
+        if self.right_handed and self.format != "bvh":
+            raise ConfigError(f"--right-handed is for --format bvh only; {self.format} is always right-handed")
 
 
 @dataclass(frozen=True)
@@ -171,3 +234,6 @@ class CalibrateOptions:
     """Do not change the rig file; the calibration lasts until the server stops."""
     keys: Annotated[Path | None, _optional("FILE")] = None
     """The client's key file, for a server that requires keys (`manipnet keys make NAME`)."""
+
+    def check(self) -> None:
+        require_file(self.keys)

@@ -18,15 +18,12 @@ from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
 from manipnet_tools.terminal import open_console
 
 RATES_HZ = (1.0, 1000.0)
-SPEEDS = (0.01, 100.0)
 SHOW_S = 0.2
 
 
 def run(options: ReplayOptions) -> None:
     """Play to the end, or until stopped. Raises `TakeError`, `ConfigError` and `PlayError`."""
-    if not SPEEDS[0] <= options.speed <= SPEEDS[1]:
-        raise TakeError(f"--speed is {options.speed:g}; allowed are {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-    take = read_take(options.take)
+    take = read_take(options.take, up=options.up)
     if options.rate is not None:
         take = resample(take, options.rate)
     frames = list(take_frames(take))

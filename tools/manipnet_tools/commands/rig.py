@@ -18,6 +18,7 @@ from manipnet.config.settings import BodyKey, all_options, input_options, server
 from manipnet.inputs import make_receivers, start_receivers
 from manipnet.net.errors import ListenError
 from manipnet.telemetry import Telemetry
+from manipnet_tools.commands.checks import require_folder_of
 from manipnet_tools.commands.rig_guess import BodyCollector, guess, rig_of
 
 EPILOG = """examples:
@@ -64,6 +65,7 @@ def init(options: argparse.Namespace) -> None:
     path: Path = options.file
     if path.exists() and not options.force:
         raise ConfigError(f"{path} already exists; --force replaces it, and keeps it as {path.name}.bak")
+    require_folder_of(path, "the rig file")
     given = {"left_wrist": options.left_wrist, "right_wrist": options.right_wrist}
     wrists = {part: _key(text) for part, text in given.items() if text is not None}
     values = read_flags(options, _server_options())

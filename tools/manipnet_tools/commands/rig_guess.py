@@ -1,4 +1,4 @@
-"""Guesses which streamed bodies are wrists, by their names or else by how far they move, and writes a rig file."""
+"""Guesses which streamed bodies are wrists, from their names or else from how far they move, and writes a rig file."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from manipnet.synthesis.objects.library import library_names
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 STEP_M: Final = 0.005
-"""Motion is counted in steps of this length, so that the noise of a tracker does not count."""
+"""Motion is measured in steps of this length, so that the noise of a tracker does not count."""
 MOVED_M: Final = 0.3
 """A wrist that was waved has moved at least this far."""
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
@@ -41,7 +41,7 @@ class StreamedBody:
 
     @property
     def key(self) -> BodyKey:
-        """How a rig names it: by its name, which people can read, or else by its streaming id."""
+        """Its key in a rig: its name, which people can read, or else its streaming id."""
         return self.name if self.name else self.id if self.id is not None else ""
 
     def add(self, sample: BodySample) -> None:

@@ -1,4 +1,4 @@
-"""`manipnet synthesize`: fingers for a take, made offline by the synthesis of the live server."""
+"""`manipnet synthesize`: synthesises the fingers of a take offline, with the synthesis of the live server."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,7 +10,6 @@ from rich.progress import Progress
 from manipnet.config.settings import WRISTS
 from manipnet.geometry import Array
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
 from manipnet.synthesis.synthesizer import Synthesizer, hand_to_world
@@ -24,14 +23,10 @@ from manipnet_tools.terminal import open_console
 
 def run(options: SynthesizeOptions) -> None:
     """Synthesise and write. Raises `TakeError`, `ConfigError`, `MeshError`, `BundleError` and `OSError`."""
-    if not 0.0 <= options.look_ahead <= MAX_LOOK_AHEAD_S:
-        raise TakeError(f"--look-ahead is {options.look_ahead:g} s; allowed are 0 to {MAX_LOOK_AHEAD_S:g}")
-    if not options.out.absolute().parent.is_dir():
-        raise TakeError(f"--out {options.out}: its folder does not exist; create it first")
     console = open_console()
     with console.status("loading take, meshes and model"):
         rig = read_rig(options.rig, options.actor)
-        rigged = read_rigged(options.take, rig)
+        rigged = read_rigged(options.take, rig, options.up)
         take = rigged.take
         shapes = read_shapes(options.mesh, take, options.take, rig)
         synthesizer = Synthesizer(load_bundle(options.model))
@@ -57,7 +52,7 @@ def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands:
 
 
 def read_shapes(meshes: Sequence[str], take: Take, path: Path, rig: RigText | None = None) -> dict[str, Shape]:
-    """Shapes by body: of `meshes` (`NAME=FILE`), or else of the recording at `path`, or else of the rig.
+    """Shapes by body, from `meshes` (`NAME=FILE`), or else from the recording at `path`, or else from the rig.
 
     Raises `TakeError` and `MeshError`.
     """
@@ -69,7 +64,7 @@ def read_shapes(meshes: Sequence[str], take: Take, path: Path, rig: RigText | No
     if not files and rig is not None:
         files = {name: file for name, file in rig.meshes.items() if name in take.objects}
     if not files:
-        objects = ", ".join(take.objects) or "there are none"
+        objects = ", ".join(take.objects) or "it has none"
         raise TakeError(f"no --mesh: at least one of the take's objects needs a mesh ({objects})")
     return {
         name: build_shape(_centred(file.load()) if take.box_centred else file.load()) for name, file in files.items()

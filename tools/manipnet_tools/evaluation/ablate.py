@@ -19,7 +19,7 @@ from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import SEEN_SHARE, load_cases
 from manipnet_tools.evaluation.options import AblateOptions
 from manipnet_tools.evaluation.results import Fold
-from manipnet_tools.evaluation.roll_outs import evaluate, folds
+from manipnet_tools.evaluation.roll_outs import baseline_rows, evaluate, folds, model_rows
 from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.terminal import open_console
 from manipnet_tools.training.dataset import CapturedHand, load_captured_hands
@@ -54,10 +54,11 @@ def run(options: AblateOptions) -> None:
             train_rows(_hands_of(fold, hands), options, fold.name, SEEN_SHARE if protocol == "seen" else 1.0)
         models = {row: lambda fold, row=row: _bundle(options.out, row, fold.name) for row in ROWS}
         with Progress(console=console) as progress:
-            results = evaluate(tests, protocol, models, ("least_squares", "none"), progress)
-        for table in report.tables(results, "ours, least squares"):
+            sources = model_rows(models, ("least_squares", "none")) | baseline_rows(models["ours"])
+            results = evaluate(tests, protocol, sources, progress)
+        for table in report.tables(results, "ours, least squares", {}):
             console.print(table)
-        content = report.as_json(results, "ours, least squares")
+        content = report.as_json(results, "ours, least squares", {})
         (options.out / f"{protocol}.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 

@@ -77,6 +77,10 @@ class Case:
         """The joints of such a hand in the object's frame, `(T, J, 3)`."""
         return geometry.transform(geometry.invert(self.T_world_object)[:, None], self._in_world(side, positions))
 
+    def in_wrist(self, side: Side, p_world: Array) -> Array:
+        """Joints in the world `(T, J, 3)` in the canonical wrist frame at this take's wrist."""
+        return _in_wrist(side, p_world, self.ticks.bodies[f"{side}_wrist"].poses)
+
     def _in_world(self, side: Side, positions: Array) -> Array:
         p_wrist = geometry.mirror_points(positions) if side == "left" else positions
         return geometry.transform(self.ticks.bodies[f"{side}_wrist"].poses[:, None], p_wrist)

@@ -8,13 +8,14 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet_tools.evaluation import report
 from manipnet_tools.evaluation.cases import load_cases
+from manipnet_tools.evaluation.finger_files import finger_files, fingers_of
 from manipnet_tools.evaluation.options import EvaluateOptions, Sweep
-from manipnet_tools.evaluation.results import Fold, row_name
-from manipnet_tools.evaluation.roll_outs import evaluate, folds
+from manipnet_tools.evaluation.realism import realism
+from manipnet_tools.evaluation.results import FINGERS, Fold, row_name
+from manipnet_tools.evaluation.roll_outs import Source, baseline_rows, evaluate, folds, model_rows
 from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.terminal import open_console
 
@@ -22,10 +23,8 @@ from manipnet_tools.terminal import open_console
 def run(options: EvaluateOptions) -> None:
     """Evaluate, print the tables and write the requested files.
 
-    Raises `DataError`, `TakeError`, `MeshError`, `BundleError` and `UnknownSolverError`.
+    Raises `DataError`, `TakeError`, `MeshError` and `BundleError`.
     """
-    for solver in options.solver:
-        solver_named(solver)
     console = open_console(stderr=False)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console) as progress:
@@ -40,18 +39,31 @@ def run(options: EvaluateOptions) -> None:
 
 
 def _protocol(options: EvaluateOptions, progress: Progress) -> tuple[dict[str, Any], list[Table]]:
-    models = _models(options)
     cases = load_cases(options.data)
-    takes = [folder.name for folder in take_folders(options.data, options.takes)]
+    files = finger_files(options.fingers, [case.name for case in cases])
+    takes = [folder.name for folder in take_folders(options.data, tuple(files) or options.takes)]
     tests = folds(cases, options.protocol, takes)
-    results = evaluate(tests, options.protocol, models, options.solver, progress)
-    ours = row_name(next(iter(models)), options.solver[0])
+    sources = {FINGERS: fingers_of(files)} if files else _model_sources(options)
+    ours = FINGERS if files else next(iter(sources))
+    results = evaluate(tests, options.protocol, sources, progress, options.only)
     if options.plots:
         from manipnet_tools.evaluation import plots
 
         for path in progress.track(list(plots.write_all(results, ours, options.plots)), description="plots"):
             progress.console.print(f"wrote {path}")
-    return report.as_json(results, ours), list(report.tables(results, ours))
+    if options.sheet:
+        from manipnet_tools.evaluation.sheet import write_sheet
+
+        answers = write_sheet(results, ours, options.sheet)
+        progress.console.print(f"wrote {options.sheet}; {answers} says which pictures are captured")
+    compared = realism(results) if "realism" in options.only else {}
+    return report.as_json(results, ours, compared), list(report.tables(results, ours, compared))
+
+
+def _model_sources(options: EvaluateOptions) -> dict[str, Source]:
+    models = _models(options)
+    sources = model_rows(models, options.solver)
+    return sources | baseline_rows(next(iter(models.values()))) if "scores" in options.only else sources
 
 
 def _sweep(options: EvaluateOptions, name: Sweep, progress: Progress) -> tuple[dict[str, Any], list[Table]]:

@@ -4,13 +4,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
+from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.commands.checks import require_folder_of
+from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.training.config import TrainConfig
 
 EvaluationProtocol = Literal["seen", "unseen"]
 """seen: the last fifth of every take. unseen: each take with a model that has not seen its object."""
 PROTOCOLS: Final[tuple[EvaluationProtocol, ...]] = ("seen", "unseen")
 Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
+
+Measures = Literal["scores", "drop", "realism"]
+"""scores: joint error, contacts, penetration, motion and physics. drop: the drop test. realism: whether a classifier
+can tell the motion from captured motion."""
+MEASURES: Final[tuple[Measures, ...]] = ("scores", "drop", "realism")
 
 ABLATION_TRAINING: Final = TrainConfig(
     architecture="manipnet", rounds=1, epochs_per_round=6, on_policy=0.0, huber=0.0, weight_average=0.99, response=0.4
@@ -35,13 +44,30 @@ class EvaluateOptions:
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""
+    only: tuple[Measures, ...] = MEASURES
+    """Measure only these; drop needs the extra `judge`."""
+    fingers: tuple[str, ...] = ()
+    """Judge files of `manipnet synthesize` (TAKE=FILE.npz) instead of models. Only the takes named here are tested."""
     sweep: Sweep | None = None
     """Evaluate instead how the last 20 % of each take changes with noise, a shorter look-ahead, other meshes, objects
     of other sizes, or over ten minutes."""
     json: Path | None = None
     """Write every figure to this file."""
+    sheet: Path | None = None
+    """Draw captured and synthesised grasps in random order into this PNG, and write which is which into a text file
+    beside it. The first model is drawn."""
     plots: Path | None = None
     """Write plots and pictures of the worst frames into this folder."""
+
+    def check(self) -> None:
+        """Raise `DataError`, `BundleError`, `UnknownSolverError` or `ConfigError` for values that cannot be used."""
+        take_folders(self.data, self.takes)
+        for solver in self.solver:
+            solver_named(solver)
+        if self.protocol == "seen" or self.sweep:
+            for model in self.model:
+                find_bundle(model)
+        require_folder_of(self.json, "--json")
 
 
 @dataclass(frozen=True)
@@ -55,3 +81,7 @@ class AblateOptions:
     protocol: tuple[EvaluationProtocol, ...] = PROTOCOLS
     """Protocols to test on."""
     training: TrainConfig = ABLATION_TRAINING
+
+    def check(self) -> None:
+        """Raise `DataError` for a folder without takes."""
+        take_folders(self.data)

@@ -6,23 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from manipnet import geometry
 from manipnet.geometry import Array, Side
 from manipnet.synthesis.hand.hand import Hand
 from manipnet_tools.evaluation import metrics
 from manipnet_tools.evaluation.cases import Case
+from manipnet_tools.evaluation.pictures import grasp_picture
 from manipnet_tools.evaluation.results import Results
 from manipnet_tools.evaluation.scoring import Score
 from manipnet_tools.rendering import (
-    CERAMIC,
-    SKIN_RIGHT,
-    Camera,
     Image,
-    PaintedMesh,
-    beads,
     contact_sheet,
-    render,
-    rods,
     save_png,
 )
 
@@ -135,24 +128,5 @@ def _worst_frames(results: Results, ours: str) -> Image:
             error[~(metrics.near(case.gaps[side]) & metrics.settled(len(case)))] = 0.0
             frame = int(error.argmax())
             if error[frame] > 0.0:
-                pictures += [_picture(case, side, hand[frame], frame) for hand in (case.captured[side], positions)]
+                pictures += [grasp_picture(case, side, hand[frame], frame) for hand in (case.captured[side], positions)]
     return contact_sheet(pictures, columns=4)
-
-
-def _picture(case: Case, side: Side, positions: Array, frame: int) -> Image:
-    """A hand's capsules on the object, seen from the thumb side; those in contact are red."""
-    T_wrist_object = geometry.compose(
-        geometry.invert(case.ticks.bodies[f"{side}_wrist"].poses[frame]), case.T_world_object[frame]
-    )
-    vertices = geometry.transform(T_wrist_object, case.shape.mesh.vertices)
-    faces = case.shape.mesh.faces.astype(np.int64)
-    if side == "left":
-        vertices, faces = geometry.mirror_points(vertices), faces[:, ::-1]
-    touches = case[frame : frame + 1].gaps_of(side, positions[None]).gap[0] < metrics.CONTACT_M
-    meshes = [PaintedMesh(vertices, faces, CERAMIC)]
-    for capsule, (start, end) in enumerate(case.hand.capsules):
-        radius, color = float(case.hand.radii[capsule]), PRESSED if touches[capsule] else SKIN_RIGHT
-        ends = positions[[start, end]]
-        meshes += [rods(ends[:1], ends[1:], radius, color), beads(ends, radius, color)]
-    view = Camera.orbit(np.array([0.1, 0.0, -0.03]), 0.5, azimuth=np.radians(160), elevation=np.radians(25))
-    return render(meshes, view, PICTURE)

@@ -11,6 +11,8 @@ Hands = dict[Side, Array]
 """Joints `(T, J, 3)` by side, in the canonical wrist frame."""
 CAPTURED, MEAN, NEAREST, HOLD = "captured fingers", "mean pose", "nearest frame", "hold"
 """Names of the rows without a network."""
+FINGERS = "fingers"
+"""The name of the row of files that `manipnet synthesize` wrote."""
 
 
 @dataclass(frozen=True)

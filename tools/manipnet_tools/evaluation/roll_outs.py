@@ -1,15 +1,16 @@
 """Makes the rows of an evaluation: models rolled out on takes, and hands that need no network."""
 
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Collection, Container, Sequence
 
 from rich.progress import Progress
 
-from manipnet.geometry import Array
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines
+from manipnet_tools.evaluation.baselines import held
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case
-from manipnet_tools.evaluation.options import EvaluationProtocol
+from manipnet_tools.evaluation.judge import Judge
+from manipnet_tools.evaluation.options import EvaluationProtocol, Measures
 from manipnet_tools.evaluation.results import (
     CAPTURED,
     HOLD,
@@ -21,8 +22,10 @@ from manipnet_tools.evaluation.results import (
     Row,
     row_name,
 )
-from manipnet_tools.evaluation.scoring import score
 from manipnet_tools.takes.rollout import roll_out
+
+Source = Callable[[Fold], list[Hands]]
+"""Makes the hands of one row for each test case of a fold."""
 
 
 def folds(cases: Sequence[Case], protocol: EvaluationProtocol, takes: Container[str]) -> list[Fold]:
@@ -41,48 +44,51 @@ def folds(cases: Sequence[Case], protocol: EvaluationProtocol, takes: Container[
 def evaluate(
     folds: Sequence[Fold],
     protocol: EvaluationProtocol,
-    models: dict[str, Callable[[Fold], Bundle]],
-    solvers: Sequence[str],
+    sources: dict[str, Source],
     progress: Progress,
+    measures: Collection[Measures] = ("scores",),
 ) -> Results:
-    """Test every model, with every solver, and the baselines on every fold.
-
-    The neutral pose of the first model is the row `hold`.
-    """
+    """Judge the captured fingers, the mean pose and the hands of every source, by name, on every fold."""
     rows: dict[str, Row] = {}
-    task = progress.add_task(protocol, total=_hand_ticks(folds, len(models) * len(solvers)))
+    task = progress.add_task(protocol, total=len(sources) * sum(len(case) for fold in folds for case in fold.test))
     for fold in folds:
         mean = baselines.mean_pose(fold.train)
-        for name, case, hands in _all_hands(fold, mean, models, solvers, lambda n: progress.advance(task, n)):
-            row = rows.setdefault(name, Row())
-            row.hands[case.name], row.scores[case.name] = hands, score(case, mean, hands)
+        hands = {CAPTURED: [case.captured for case in fold.test], MEAN: [held(case, mean) for case in fold.test]}
+        for name, source in sources.items():
+            hands[name] = source(fold)
+            progress.advance(task, sum(map(len, fold.test)))
+        for k, case in enumerate(fold.test):
+            judge = Judge(case, mean, measures)
+            drops = progress.add_task(f"drop {case.name}", total=judge.drops * len(hands), visible=judge.drops > 0)
+            for name, of_cases in hands.items():
+                row = rows.setdefault(name, Row())
+                row.hands[case.name] = of_cases[k]
+                row.scores[case.name] = judge(of_cases[k], lambda n, drops=drops: progress.advance(drops, n))
     return Results(protocol, {case.name: case for fold in folds for case in fold.test}, rows)
 
 
-def _hand_ticks(folds: Sequence[Fold], variants: int) -> int:
-    return 2 * variants * sum(len(case) for fold in folds for case in fold.test)
+def model_rows(models: dict[str, Callable[[Fold], Bundle]], solvers: Sequence[str]) -> dict[str, Source]:
+    """A row for every model with every solver."""
+    return {
+        row_name(name, solver): lambda fold, model=model, solver=solver: synthesise(model(fold), solver, fold.test)
+        for name, model in models.items()
+        for solver in solvers
+    }
 
 
-def _all_hands(
-    fold: Fold,
-    mean: Array,
-    models: dict[str, Callable[[Fold], Bundle]],
-    solvers: Sequence[str],
-    advance: Callable[[int], None],
-) -> Iterator[tuple[str, Case, Hands]]:
-    bundles = {name: model(fold) for name, model in models.items()}
-    first = next(iter(bundles.values()))
-    rest = Synthesizer(first).rest_state()
-    retrieve = baselines.Retrieval(fold.train, first.hand, rest)
-    for case in fold.test:
-        yield CAPTURED, case, case.captured
-        yield MEAN, case, baselines.held(case, mean)
-        yield NEAREST, case, retrieve(case)
-        yield HOLD, case, baselines.held(case, rest.positions)
-    for name, bundle in bundles.items():
-        for solver in solvers:
-            for case, hands in zip(fold.test, synthesise(bundle, solver, fold.test, advance), strict=True):
-                yield row_name(name, solver), case, hands
+def baseline_rows(model: Callable[[Fold], Bundle]) -> dict[str, Source]:
+    """The fingers of the nearest training frame, and the neutral pose of a model for every frame."""
+
+    def nearest(fold: Fold) -> list[Hands]:
+        bundle = model(fold)
+        retrieve = baselines.Retrieval(fold.train, bundle.hand, Synthesizer(bundle).rest_state())
+        return [retrieve(case) for case in fold.test]
+
+    def hold(fold: Fold) -> list[Hands]:
+        rest = Synthesizer(model(fold)).rest_state()
+        return [held(case, rest.positions) for case in fold.test]
+
+    return {NEAREST: nearest, HOLD: hold}
 
 
 def synthesise(

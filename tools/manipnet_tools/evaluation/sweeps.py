@@ -20,8 +20,9 @@ from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet.tracking.tick import TICK_HZ
 from manipnet_tools.evaluation import baselines, physics
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case, load_case
+from manipnet_tools.evaluation.judge import Judge
 from manipnet_tools.evaluation.roll_outs import synthesise
-from manipnet_tools.evaluation.scoring import Score, average, score
+from manipnet_tools.evaluation.scoring import Score, average
 from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.takes.rollout import HandInput, hand_inputs, roll_out, tick_take
 from manipnet_tools.takes.take import BodyTrack, Take, read_take
@@ -64,7 +65,7 @@ def sweep(
     for step, change in CHANGES[name].items():
         cases = [change(subject.take, subject.case).part(SEEN_SHARE, 1.0) for subject in subjects]
         hands = synthesise(bundle, solver, cases, advance)
-        scores = [score(case, mean, of).values() for case, of in zip(cases, hands, strict=True)]
+        scores = [Judge(case, mean, ("scores",))(of).values() for case, of in zip(cases, hands, strict=True)]
         yield step, average(one for sides in scores for one in sides)
 
 
@@ -167,7 +168,7 @@ def _loop(
     for start in range(0, frames - len(case), both_ways):
         positions = [motion.positions[start : start + len(case)] for motion in motions]
         hands = dict(zip(case.inputs, positions, strict=True))
-        yield f"from {start / TICK_HZ:.0f} s", average(score(case, mean, hands).values())
+        yield f"from {start / TICK_HZ:.0f} s", average(Judge(case, mean, ("scores",))(hands).values())
 
 
 def forwards_and_backwards(seen: HandInput, at: np.ndarray, forwards: np.ndarray) -> HandInput:

@@ -1,7 +1,7 @@
-"""What an export writes: hands and objects over time, from wherever fingers come from."""
+"""Animations for export: hands and objects over time, from recordings, synthesised files and captured takes."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from zipfile import BadZipFile
@@ -18,35 +18,35 @@ from manipnet_tools.takes.meshes import recorded_meshes
 from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
 
 PAUSE_S = 10.0
-"""A recording whose sender's time jumps back, or on by more than this, goes on with another animation."""
+"""A recording is split where its sender's time jumps back, or forward by more than this."""
 
 
 class ExportError(ValueError):
-    """Something that cannot be exported; the text says why and what to do."""
+    """Something cannot be exported; the text says why and what to do."""
 
 
 @dataclass(frozen=True)
 class HandTrack:
-    """One hand of `T` frames; a left one as it is, not mirrored."""
+    """The motion of one hand over `T` frames. A left hand is not mirrored."""
 
     model: Hand
-    """The hand whose bones it has, apart from their lengths."""
+    """The hand whose skeleton it has, with `J` joints and `B` bones; only the lengths of the bones may differ."""
     wrist: Array
-    """`(T, 7)` in the world."""
+    """Poses `(T, 7)` in the world."""
     rotations: Array
-    """`(T, 17, 4)`: the wrist's in the world, every other bone's in its parent bone."""
+    """Rotations `(T, B, 4)`: the wrist's in the world, and those of the other bones relative to their parent bones."""
     offsets: Array
-    """`(22, 3)` of each joint in its parent bone, metres."""
+    """Position `(J, 3)` of each joint in the frame of its parent bone, metres."""
     live: np.ndarray
-    """`(T,)` false where the hand was held or at rest because tracking was lost."""
+    """`(T,)`, false where the hand was held or at rest because tracking was lost."""
 
     @property
     def scale(self) -> float:
-        """Size over the model's hand."""
+        """Size relative to the model's hand."""
         return float(np.linalg.norm(self.offsets) / np.linalg.norm(self.model.offsets))
 
     def world(self) -> tuple[Array, Array]:
-        """Joints `(T, 22, 3)` and bone rotations `(T, 17, 4)` in the world."""
+        """Joints `(T, J, 3)` and bone rotations `(T, B, 4)` in the world."""
         positions, rotations = np.empty((len(self.wrist), self.model.joint_count, 3)), self.rotations.copy()
         positions[:, 0] = self.wrist[:, :3]
         for joint, parent in enumerate(self.model.parents[1:], start=1):
@@ -66,14 +66,14 @@ class Animation:
     hands: dict[Side, HandTrack]
     objects: dict[str, BodyTrack] = field(default_factory=dict)
     meshes: dict[str, ClosedMesh] = field(default_factory=dict)
-    """Of those objects whose shape is known."""
+    """The meshes of the objects whose shape is known."""
 
 
 def read_animation(path: Path, model: Hand, actor: str | None = None) -> Animation:
-    """Fingers of the hand `model` from a recording (of one `actor`, the first by default), the file of
-    `manipnet synthesize`, or a take.
+    """Read an animation of the hand `model` from a recording, a file of `manipnet synthesize`, or a take.
 
-    Raises `ExportError`, `TakeError`, `RecordingError` and `MeshError`.
+    `actor` chooses whose hands are read from a recording; by default they are those of its first actor. Raises
+    `ExportError`, `TakeError`, `RecordingError` and `MeshError`.
     """
     suffix = path.suffix.lower()
     if suffix == ".npz":
@@ -90,7 +90,7 @@ def read_animation(path: Path, model: Hand, actor: str | None = None) -> Animati
 
 
 def hand_track(model: Hand, positions: Array, rotations: Array) -> HandTrack:
-    """A track from joints `(T, 22, 3)` and bone rotations `(T, 17, 4)` in the world."""
+    """A track from joints `(T, J, 3)` and bone rotations `(T, B, 4)` in the world."""
     local = rotations.copy()
     local[:, 1:] = quat_multiply(quat_conjugate(rotations[:, model.parents[1 : model.bone_count]]), rotations[:, 1:])
     offsets = np.zeros((model.joint_count, 3))
@@ -120,7 +120,7 @@ def _read_synthesised(path: Path, model: Hand) -> Animation:
     except OSError as error:
         raise ExportError(f"{path}: cannot be read ({error.strerror or error})") from None
     except (KeyError, ValueError, BadZipFile) as error:
-        raise ExportError(f"{path}: is no file of `manipnet synthesize` ({error}); make it again") from None
+        raise ExportError(f"{path}: is not a file of `manipnet synthesize` ({error}); make it again") from None
     seen = np.ones(len(time_s), dtype=np.bool_)
     objects, meshes = {}, {}
     for k, name in enumerate(arrays.get("objects", np.empty(0, str)).tolist()):
@@ -145,7 +145,7 @@ def _read_recording(path: Path, model: Hand, actor: str | None) -> Animation:
         side: track for side in SIDES if (track := _recorded_hand(model, frames, side)) is not None
     }
     if not hands:
-        raise ExportError(f"{path}: its hands messages hold no hand; was a wrist tracked?")
+        raise ExportError(f"{path}: its messages contain no hand, probably because no wrist was tracked")
     names = dict.fromkeys(body.name for message in run for body in message.bodies if not body.name.endswith("_wrist"))
     objects = {name: _recorded_body(frames, name) for name in names}
     meshes = {name: mesh for name, mesh in recorded_meshes(path).items() if name in objects}
@@ -183,11 +183,3 @@ def _recorded_body(frames: list[HandsMessage | None], name: str) -> BodyTrack:
     there = np.array([body is not None for body in bodies])
     poses = np.stack([body.pose if body is not None else np.zeros(7) for body in bodies])[last_tracked(there)]
     return BodyTrack(poses, np.array([body is not None and body.tracked for body in bodies]))
-
-
-def with_meshes(animation: Animation, meshes: Mapping[str, ClosedMesh]) -> Animation:
-    """The same with these `meshes` instead of those it knew. Raises `ExportError` for an object it does not have."""
-    if unknown := meshes.keys() - animation.objects.keys():
-        have = ", ".join(animation.objects) or "none"
-        raise ExportError(f"--mesh {min(unknown)}=…: {animation.name} has the objects {have}")
-    return replace(animation, meshes=animation.meshes | dict(meshes))

@@ -1,4 +1,4 @@
-"""Hands and objects as BVH: the ManipNet dataset's skeleton and layout, or the same right-handed for other programs."""
+"""Writes hands and objects as BVH: with the skeleton and layout of the dataset, or right-handed for other programs."""
 
 import warnings
 from pathlib import Path
@@ -19,11 +19,12 @@ _ROOT_CHANNELS = f"CHANNELS 6 Xposition Yposition Zposition {_CHANNELS}"
 def write_bvh(animation: Animation, folder: Path, right_handed: bool = False) -> list[Path]:
     """Write `leftHand.bvh`, `rightHand.bvh` and `<object>.bvh` into `folder`; returns the files.
 
-    As the dataset's own files they are left-handed decimetres, which every tool here reads; `right_handed` ones are
-    centimetres as Blender and Maya expect them, and are not read here. Raises `ExportError` where takes are already.
+    By default the files are left-handed and in decimetres, like the dataset's, and every tool here reads them. With
+    `right_handed` they are in centimetres, as Blender and Maya expect; no tool here reads those. Raises `ExportError`
+    if the folder already contains BVH files.
     """
     if any(folder.glob("*.bvh")):
-        raise ExportError(f"{folder}: holds BVH files already, which may be a take; give a new folder")
+        raise ExportError(f"{folder}: already contains BVH files, which may be a take; give a new folder")
     folder.mkdir(parents=True, exist_ok=True)
     space = _Space(CENTIMETRES_PER_M, False) if right_handed else _Space(1.0 / DECIMETRE_M, True)
     texts = {f"{side}Hand": _hand_text(hand, animation.rate_hz, space) for side, hand in animation.hands.items()}
@@ -49,10 +50,10 @@ class _Space:
         return self._per_m * (mirror_points(points) if self._mirrored else points)
 
     def degrees(self, quats: Array) -> Array:
-        """Angles `(T, ..., 3)` about Y, then X, then Z, each about the axes as turned so far, without jumps."""
+        """Intrinsic Euler angles `(T, ..., 3)` in the order Y, X, Z, unwrapped so that they never jump by 360°."""
         quats = mirror_quats(quats) if self._mirrored else quats
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # at the pole scipy picks one of many right answers
+            warnings.simplefilter("ignore", UserWarning)  # about gimbal lock, where one of many solutions is chosen
             angles = Rotation.from_quat(quats.reshape(-1, 4)).as_euler("YXZ", degrees=True)
         return np.unwrap(angles.reshape(*quats.shape[:-1], 3), period=360.0, axis=0)
 
@@ -66,7 +67,7 @@ def _hand_text(hand: HandTrack, rate_hz: float, space: _Space) -> str:
 
 
 def _joint(model: Hand, joint: int, offsets: Array, indent: str) -> list[str]:
-    """Lines of a joint and all below it; the dataset's joints are in depth-first order, as ours are."""
+    """The lines of a joint and its descendants; a hand's joints are in depth-first order, as the format requires."""
     if joint >= model.bone_count:
         head, channels = f"{indent}End Site", []
     elif joint == 0:

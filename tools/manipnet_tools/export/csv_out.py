@@ -1,4 +1,4 @@
-"""Hands and objects as one table: a row per frame, a named column per number; `docs/export.md` lists the columns."""
+"""Writes hands and objects as one table with a row for each frame; `docs/export.md` lists the columns."""
 
 import csv
 from pathlib import Path
@@ -14,7 +14,7 @@ _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def write_csv(animation: Animation, path: Path) -> None:
-    """Write the table; right-handed, Y up, metres, radians, seconds. Raises `OSError`."""
+    """Write the table in right-handed, Y-up coordinates, metres, radians and seconds. Raises `OSError`."""
     columns: dict[str, Array] = {"time_s": animation.time_s}
     for side, hand in animation.hands.items():
         columns |= _hand_columns(side, hand)
@@ -40,6 +40,6 @@ def _hand_columns(side: Side, hand: HandTrack) -> dict[str, Array]:
 
 
 def hand_angles(model: Hand, side: Side, rotations: Array) -> Array:
-    """The angles `(T, A)` nearest to bone rotations `(T, 17, 4)` in the world."""
+    """The joint angles `(T, A)` that fit bone rotations `(T, B, 4)` in the world best."""
     quats = quat_multiply(quat_conjugate(rotations[:, :1]), rotations)
     return angles_from_rotations(model, quat_to_matrix(mirror_quats(quats) if side == "left" else quats))

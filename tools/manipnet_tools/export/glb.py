@@ -1,7 +1,6 @@
-"""The container of glTF 2.0: accessors in one buffer, and the file around them.
+"""Writes the container of glTF 2.0: accessors in one buffer, and the file that holds them.
 
-Source: Khronos, glTF 2.0 specification, sections 3.6 (accessors) and 4.4 (GLB). Written here because no library would
-save more than the forty lines it takes.
+Source: Khronos, glTF 2.0 specification, sections 3.6 (accessors) and 4.4 (GLB). A library would save only forty lines.
 """
 
 import base64
@@ -22,7 +21,7 @@ _TYPES: Final = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4):
 
 
 class Buffer:
-    """Arrays packed one after the other, each with its view and its accessor."""
+    """Arrays that are packed one after the other, each with its buffer view and its accessor."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
@@ -30,12 +29,13 @@ class Buffer:
         self._accessors: list[dict[str, Any]] = []
 
     def add(self, values: NDArray[Any], target: int | None = None, bounds: bool = False) -> int:
-        """The accessor of `values (n,)` or `(n, k)`, unsigned or float32; of matrices `(n, 4, 4)`, row by row.
+        """Append an array, and return the index of its accessor.
 
-        `target` is what a vertex buffer is for; `bounds` writes the least and greatest values.
+        The values are unsigned integers or float32, `(n,)`, `(n, k)` or matrices `(n, 4, 4)`. `target` is the purpose
+        of the buffer view, if it has one; `bounds` adds the smallest and largest values to the accessor.
         """
         kind = _TYPES[values.shape[1:]]
-        flat = np.swapaxes(values, 1, 2) if kind == "MAT4" else values  # the file has columns
+        flat = np.swapaxes(values, 1, 2) if kind == "MAT4" else values  # glTF stores matrices by column
         view: dict[str, Any] = {"buffer": 0, "byteOffset": len(self._bytes), "byteLength": values.nbytes}
         self._views.append(view | ({"target": target} if target else {}))
         accessor = {"bufferView": len(self._views) - 1, "componentType": _COMPONENTS[values.dtype]}

@@ -1,6 +1,7 @@
-"""Hands and objects as glTF 2.0: both hands as skinned meshes with their skeletons, objects, and one animation.
+"""Writes hands and objects as glTF 2.0: hands as skinned meshes with skeletons, objects as meshes, and one animation.
 
-Right-handed, Y up, metres, as glTF wants it. Time starts at the first frame. The skin is the model hand's own.
+Coordinates are right-handed, Y up, in metres, as glTF requires. Time starts at the first frame. The skin is that of the
+model's hand.
 """
 
 from collections.abc import Mapping
@@ -25,7 +26,7 @@ _COLOURS: Mapping[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right
 
 def write_gltf(animation: Animation, path: Path) -> None:
     """Write `.glb` or `.gltf`. Raises `OSError`."""
-    scene = _Scene(animation)
+    scene = _Document(animation)
     for side, hand in animation.hands.items():
         scene.add_hand(side, hand)
     for name, body in animation.objects.items():
@@ -33,7 +34,7 @@ def write_gltf(animation: Animation, path: Path) -> None:
     scene.save(path)
 
 
-class _Scene:
+class _Document:
     """A document that grows node by node."""
 
     def __init__(self, animation: Animation) -> None:
@@ -48,7 +49,7 @@ class _Scene:
         self._times = self._buffer.add(time_s, bounds=True)
 
     def add_hand(self, side: Side, hand: HandTrack) -> None:
-        """A skeleton of 22 joints, tips included, and the skin that follows it."""
+        """Add the skeleton of a hand, with its fingertips, and the skin that follows it."""
         first, model = len(self._document["nodes"]), hand.model
         for joint, name in enumerate(model.joint_names):
             children = [first + int(child) for child in np.flatnonzero(joint == model.parents)]
@@ -65,7 +66,7 @@ class _Scene:
         self._roots += [first, body]
 
     def add_object(self, name: str, poses: Array, mesh: ClosedMesh | None) -> None:
-        """A moving mesh, or a bare node where the shape is not known."""
+        """Add a moving mesh, or only a moving node if the shape of the object is not known."""
         index = None
         if mesh is not None:
             vertices, normals, faces = split_creases(mesh.vertices, mesh.faces)
@@ -104,7 +105,10 @@ class _Scene:
             self._document["nodes"][node][path] = keys[0].tolist()
 
     def _skin_mesh(self, model: Hand, side: Side, scale: float) -> tuple[int, int]:
-        """The skin of a hand in its bind pose, and the accessor of the matrices from there to each joint."""
+        """Add the skin of a hand in its bind pose.
+
+        Returns the indices of its mesh and of the accessor of its inverse bind matrices.
+        """
         positions, rotations = forward_kinematics(model, model.skin.bind_angles)
         vertices, faces = scale * model.skin.vertices, model.skin.faces
         joints = np.arange(model.joint_count)
@@ -151,7 +155,10 @@ class _Scene:
 
 
 def split_creases(vertices: Array, faces: NDArray[np.integer[Any]]) -> tuple[Array, Array, NDArray[np.integer[Any]]]:
-    """Vertices, unit normals and faces with a vertex for every side of a sharp edge, so that it looks sharp."""
+    """Give each side of a sharp edge vertices of its own, so that it looks sharp.
+
+    Returns the new vertices, their unit normals, and the faces.
+    """
     normals = corner_normals(vertices, faces.astype(np.int64)).reshape(-1, 3)
     corners = np.concatenate([faces.reshape(-1, 1), np.round(normals * 1e4)], axis=1)
     _, first, corner = np.unique(corners, axis=0, return_index=True, return_inverse=True)
@@ -167,7 +174,7 @@ def _vertex_normals(vertices: Array, faces: NDArray[np.integer[Any]]) -> Array:
 
 
 def _unit_sum(weights: Array) -> NDArray[np.float32]:
-    """Weights `(V, 4)` that sum to one in single precision, the greatest first."""
+    """Weights `(V, 4)`, whose first column is the largest, rounded so that they sum to one in single precision."""
     rounded = weights.astype(np.float32)
     rounded[:, 0] = np.float32(1.0) - rounded[:, 1:].sum(axis=1, dtype=np.float32)
     return rounded

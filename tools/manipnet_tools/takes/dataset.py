@@ -5,14 +5,14 @@ from pathlib import Path
 
 
 class DataError(ValueError):
-    """A folder is not the dataset's or lacks something; the text says what is missing."""
+    """A folder does not have the layout of the dataset; the text says what is missing."""
 
 
 def take_folders(data: Path, names: Sequence[str] = ()) -> list[Path]:
-    """The folders of all takes, or of those named. Raises `DataError`."""
+    """The folders of all takes, or of the takes in `names`. Raises `DataError`."""
     folders = sorted(path for path in (data / "BVH").glob("*") if path.is_dir())
     if not folders:
-        raise DataError(f"{data}: holds no takes; expected are folders BVH/<take>/ with the dataset's BVH files")
+        raise DataError(f"{data}: contains no takes; it must have folders BVH/<take>/ with BVH files")
     found = {path.name: path for path in folders}
     if unknown := set(names) - found.keys():
         raise DataError(f"{data}: has no take {', '.join(sorted(unknown))}; it has {', '.join(sorted(found))}")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from manipnet.config.settings import parse_mesh
 from manipnet.recording.mcap_file import read_about
 from manipnet.synthesis.objects.mesh import ClosedMesh, MeshError, load_mesh
 from manipnet_tools.takes.take import TakeError
@@ -26,18 +27,16 @@ class MeshFile:
 def named_files(texts: Sequence[str], names: Iterable[str] | None = None) -> dict[str, Path]:
     """Files by name from the options `--mesh NAME=FILE`, where NAME must be one of `names` if they are given.
 
-    Raises `TakeError`.
+    Raises `ConfigError` for another text, and `TakeError` for another name.
     """
     files: dict[str, Path] = {}
     for text in texts:
-        name, _, file = text.partition("=")
-        if not (name and file):
-            raise TakeError(f"--mesh {text}: must be NAME=FILE, for example Box=meshes/box.obj")
+        name, file = parse_mesh(text)
         if names is not None and name not in names:
             raise TakeError(
                 f"--mesh {text}: no object is called {name!r}; the objects are {', '.join(names) or 'none'}"
             )
-        files[name] = Path(file)
+        files[name] = file
     return files
 
 

@@ -1,136 +1,112 @@
-"""Reads the rigid bodies of a take that OptiTrack Motive exported as CSV.
+"""Reads the rigid bodies and bones of a take that OptiTrack Motive exported as CSV.
 
-The first line holds pairs of a key and a value. The head of the table starts at the line `,Type,…`: Type, Name, ID,
-perhaps Parent, then Rotation or Position, then the component. An empty cell means that a body was lost in that frame.
-The time column is rounded to a millisecond, so times are computed as frame ÷ rate.
-Source: docs.optitrack.com, "Data Export: CSV".
+The first line holds pairs of a key and a value, and a table follows (`motive_table`); before format 1.2 it was a list
+of frames (`motive_frames`). An empty cell means that a body was lost in that frame. The time column is rounded to a
+millisecond, so times are computed from the frame numbers.
+Source: docs.optitrack.com, "Data Export: CSV", and files of the format versions 1.1 to 1.25.
 """
 
-import csv
+import logging
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import Array
+from manipnet_tools.takes.motive_frames import read_frames
+from manipnet_tools.takes.motive_table import Columns, MotiveCsvError, Table, read_table
+from manipnet_tools.takes.text_file import read_text
 
-UNITS_M = {"meters": 1.0, "centimeters": 0.01, "millimeters": 0.001}
-EULER_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
-QUATERNION = "XYZW"
-UNTRACKED = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-
-
-class MotiveCsvError(ValueError):
-    """A CSV file is not a usable Motive export; the text names the file, the place and the remedy."""
+UNITS_M: Final = {"meters": 1.0, "centimeters": 0.01, "millimeters": 0.001}
+EULER_ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
+QUATERNION: Final = "XYZW"
+UNTRACKED: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+FIRST_WORDS: Final = ("comment", "info")
+HANDEDNESS: Final = ("righthanded", "lefthanded")
+"""How the list of frames of older versions begins."""
+FARTHEST_M: Final = 1000.0
+QUATERNION_LENGTHS: Final = (0.25, 4.0)
+"""Poses beyond these are numbers that lost their decimal points."""
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class MotiveCsv:
-    """Poses `(T, 7)` in metres and whether they were tracked `(T,)`, by rigid body; `time_s (T,)` from the start."""
+    """Poses `(T, 7)` in metres and whether they were tracked `(T,)`, by body; `time_s (T,)` from the start.
+
+    Rigid bodies come first, then bones, which are called `Skeleton:Bone`.
+    """
 
     rate_hz: float
     time_s: Array
     bodies: dict[str, tuple[Array, NDArray[np.bool_]]]
 
 
-@dataclass(frozen=True)
-class _Body:
-    """The columns of one rigid body, by component."""
-
-    rotation: dict[str, int]
-    position: dict[str, int]
-
-
 def read_motive_csv(path: Path) -> MotiveCsv:
-    """Read an export with rigid bodies. Raises `MotiveCsvError`."""
+    """Read an export with rigid bodies or bones. Raises `MotiveCsvError`."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        remedy = "; save it as UTF-8" if isinstance(error, UnicodeDecodeError) else ""
-        raise MotiveCsvError(f"{path}: cannot be read ({error}){remedy}") from None
-    try:
-        return _parse(lines)
+        text = read_text(path)
+        is_list = text.lstrip().lower().startswith(tuple(f"{word}," for word in FIRST_WORDS) + HANDEDNESS)
+        return _motive_csv(read_frames(text) if is_list else read_table(text, str(path)), str(path))
+    except OSError as error:
+        raise MotiveCsvError(f"{path}: cannot be read ({error})") from None
     except MotiveCsvError as error:
         raise MotiveCsvError(f"{path}: {error}") from None
 
 
-def _parse(lines: list[list[str]]) -> MotiveCsv:
-    options = dict(zip(lines[0][::2], lines[0][1::2], strict=False)) if lines else {}
-    head = next((i for i, line in enumerate(lines) if line[1:2] == ["Type"]), None)
-    first = next((i for i, line in enumerate(lines) if line[:1] == ["Frame"]), None)
-    if "Format Version" not in options or head is None or first is None or first < head:
-        raise MotiveCsvError("is not a CSV export of Motive; turn on Header Information when exporting")
-    rate_hz = _rate(options)
-    scale, rotation = _choice(options, "Length Units", UNITS_M), options.get("Rotation Type", "Quaternion")
+def _motive_csv(table: Table, where: str) -> MotiveCsv:
+    options = table.options
+    scale = _unit(options)
+    rotation = options.get("Rotation Type", "Quaternion")
     if options.get("Coordinate Space", "Global") != "Global":
         raise MotiveCsvError(f"Coordinate Space is {options['Coordinate Space']}; export it as Global")
-    bodies = _bodies(lines[head : first + 1])
-    numbers, values = _values(lines[first + 1 :], first + 2, len(lines[head]))
-    return MotiveCsv(
-        rate_hz,
-        (numbers - numbers[0]) / rate_hz,
-        {name: _track(name, body, values, scale, rotation) for name, body in bodies.items()},
-    )
+    step_s = _frame_step(table)
+    numbers = table.frames
+    bodies = {name: _track(name, columns, table.values, scale, rotation) for name, columns in table.bodies.items()}
+    rate_hz = 1.0 / (step_s * float(np.median(np.diff(numbers)))) if len(numbers) > 1 else 1.0 / step_s
+    announced = options.get("Total Exported Frames", "")
+    if announced.isdigit() and int(announced) != len(numbers):
+        _log.warning("%s: announces %s frames but has %d, which are used", where, announced, len(numbers))
+    return MotiveCsv(round(rate_hz, 3), (numbers - numbers[0]) * step_s, bodies)
 
 
-def _rate(options: dict[str, str]) -> float:
-    text = options.get("Export Frame Rate") or options.get("Capture Frame Rate") or ""
+def _unit(options: dict[str, str]) -> float:
+    value = options.get("Length Units", "Meters")
+    if value.lower() not in UNITS_M:
+        raise MotiveCsvError(f"Length Units is {value!r}; allowed are {', '.join(UNITS_M)}")
+    return UNITS_M[value.lower()]
+
+
+def _frame_step(table: Table) -> float:
+    """Seconds from one frame number to the next: by the rate of the export, or of the capture if the times say so."""
+    keys = [key for key in ("Export Frame Rate", "Capture Frame Rate") if table.options.get(key)]
+    steps_s = [1.0 / _rate(table.options[key], key) for key in keys]
+    if not steps_s:
+        raise MotiveCsvError("Export Frame Rate is missing from the first line; export the take again")
+    times_s, frames = table.times_s[[0, -1]], table.frames[[0, -1]]
+    if not np.isfinite(times_s).all() or np.ptp(times_s) < 0.1:
+        return steps_s[0]
+    measured_s = float((times_s[1] - times_s[0]) / (frames[1] - frames[0]))
+    return min(steps_s, key=lambda step_s: abs(step_s - measured_s) > 0.05 * measured_s)
+
+
+def _rate(text: str, key: str) -> float:
     try:
         rate_hz = float(text)
     except ValueError:
         rate_hz = 0.0
     if not 1.0 <= rate_hz <= 2000.0:
-        raise MotiveCsvError(f"Export Frame Rate is {text!r}; it must be 1 to 2000 Hz")
+        raise MotiveCsvError(f"{key} is {text!r}; it must be 1 to 2000 Hz")
     return rate_hz
 
 
-def _choice(options: dict[str, str], key: str, allowed: dict[str, float]) -> float:
-    value = options.get(key, "Meters").lower()
-    if value not in allowed:
-        raise MotiveCsvError(f"{key} is {options[key]!r}; allowed are {', '.join(allowed)}")
-    return allowed[value]
-
-
-def _bodies(head: list[list[str]]) -> dict[str, _Body]:
-    rows = {line[1]: line for line in head[:-1] if len(line) > 1 and line[1]}
-    kinds, components = head[-2], head[-1]
-    types, names = rows["Type"], rows.get("Name", [])
-    bodies: dict[str, _Body] = {}
-    for column, (kind, part, component) in enumerate(zip(types, kinds, components, strict=False)):
-        if kind == "Rigid Body" and part in ("Rotation", "Position") and column < len(names):
-            body = bodies.setdefault(names[column], _Body({}, {}))
-            (body.rotation if part == "Rotation" else body.position)[component] = column
-    bodies = {name: body for name, body in bodies.items() if body.rotation and body.position.keys() == set("XYZ")}
-    if not bodies:
-        found = ", ".join(sorted(set(types[2:]))) or "nothing"
-        raise MotiveCsvError(
-            f"has no rigid body with rotation and position, only {found}; turn on Rigid Bodies when exporting"
-        )
-    return bodies
-
-
-def _values(lines: list[list[str]], number: int, width: int) -> tuple[Array, Array]:
-    """Frame numbers `(T,)` and all cells `(T, width)`, in which an empty cell is NaN."""
-    rows = []
-    for line_number, line in enumerate(lines, start=number):
-        if not any(line):
-            continue
-        try:
-            rows.append([float(cell) if cell else np.nan for cell in [*line, *[""] * width][:width]])
-        except ValueError as error:
-            raise MotiveCsvError(f"line {line_number}: {error}") from None
-    if not rows or np.isnan(frames := np.array(rows)[:, 0]).any() or (np.diff(frames) <= 0.0).any():
-        raise MotiveCsvError("every line of the table must start with a frame number greater than the one before")
-    return frames, np.array(rows)
-
-
-def _track(name: str, body: _Body, values: Array, scale: float, rotation: str) -> tuple[Array, NDArray[np.bool_]]:
+def _track(name: str, body: Columns, values: Array, scale: float, rotation: str) -> tuple[Array, NDArray[np.bool_]]:
     """Poses, and whether they were tracked; a lost body keeps its last pose, or has its first one before that."""
     positions = scale * values[:, [body.position[axis] for axis in "XYZ"]]
-    if rotation == "Quaternion" and body.rotation.keys() == set(QUATERNION):
+    if rotation in ("Quaternion", *EULER_ORDERS) and body.rotation.keys() == set(QUATERNION):
         quats = values[:, [body.rotation[axis] for axis in QUATERNION]]
         quats = np.where(np.linalg.norm(quats, axis=1, keepdims=True) > 1e-6, quats, np.nan)
     elif rotation in EULER_ORDERS and body.rotation.keys() == set("XYZ"):
@@ -142,8 +118,25 @@ def _track(name: str, body: _Body, values: Array, scale: float, rotation: str) -
         raise MotiveCsvError(f"body {name!r} has rotations {found}; export Quaternion or XYZ")
     poses = np.concatenate([positions, quats], axis=1)
     tracked = np.asarray(np.isfinite(poses).all(axis=1))
-    poses = poses[np.maximum.accumulate(np.where(tracked, np.arange(len(tracked)), np.argmax(tracked)))]
     if not tracked.any():
         poses[:] = UNTRACKED
+        return poses, tracked
+    poses = poses[np.maximum.accumulate(np.where(tracked, np.arange(len(tracked)), np.argmax(tracked)))]
+    _check_plausible(name, poses)
     poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
     return poses, tracked
+
+
+def _check_plausible(name: str, poses: Array) -> None:
+    lengths, farthest_m = np.linalg.norm(poses[:, 3:], axis=1), float(np.abs(poses[:, :3]).max())
+    shortest, longest = QUATERNION_LENGTHS
+    if farthest_m > FARTHEST_M:
+        found = f"positions up to {farthest_m:.3g} m"
+    elif not (shortest <= lengths.min() and lengths.max() <= longest):
+        found = f"quaternions of length {lengths.max() if lengths.max() > longest else lengths.min():.3g} instead of 1"
+    else:
+        return
+    raise MotiveCsvError(
+        f"body {name!r} has {found}: another program has saved the file without its decimal points, "
+        "or it is not the export of a take; export it from Motive again"
+    )

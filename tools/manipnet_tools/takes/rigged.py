@@ -6,13 +6,15 @@ A tracker sends bodies, to which a rig must be applied. A recording made beside 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Literal
 
 from manipnet.config.rig_reader import load_rig, parse_rig
 from manipnet.config.settings import ActorConfig, BodyConfig
 from manipnet.geometry import compose
 from manipnet.recording.mcap_file import HANDS, read_about, read_hands
+from manipnet_tools.takes.body_names import conventional
 from manipnet_tools.takes.meshes import MeshFile
-from manipnet_tools.takes.take import BodyTrack, Take, TakeError, conventional, read_take
+from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,12 @@ def read_rig(file: Path | None, actor: str | None = None) -> RigText | None:
     return replace(rig, meshes={prop.name: MeshFile(prop.mesh.absolute(), prop.unit, prop.scale) for prop in props})
 
 
-def read_rigged(path: Path, rig: RigText | None = None) -> RiggedTake:
+def read_rigged(path: Path, rig: RigText | None = None, up: Literal["y", "z"] = "y") -> RiggedTake:
     """Read a take and apply `rig`, or else the rig that is kept in a recording of bodies alone.
 
-    Raises `TakeError` and `ConfigError`.
+    `up` is the axis of the take that points up. Raises `TakeError` and `ConfigError`.
     """
-    take = read_take(path)
+    take = read_take(path, _keys(rig), up)
     about = read_about(path) if path.suffix.lower() == ".mcap" else None
     if about is not None and about.counts.get(HANDS):
         return RiggedTake(take, _recorded_scale(path) if rig is None else rig.config().hand_scale)
@@ -68,10 +70,20 @@ def read_rigged(path: Path, rig: RigText | None = None) -> RiggedTake:
     return RiggedTake(apply_rig(take, config, rig.where), config.hand_scale)
 
 
+def _keys(rig: RigText | None) -> frozenset[str]:
+    """The names that a rig gives its bodies, which a take must not change."""
+    if rig is None:
+        return frozenset()
+    config = rig.config()
+    bodies = [*config.wrists.values(), *(prop.body for prop in config.objects)]
+    return frozenset(str(body.key) for body in bodies)
+
+
 def apply_rig(take: Take, config: ActorConfig, where: str) -> Take:
     """Turn the take's bodies into the wrists and props of an actor.
 
-    Bodies that are not in the rig stay as they are. Raises `TakeError` if the body of a wrist is missing.
+    Bodies that are not in the rig stay as they are. Raises `TakeError` if the body of a wrist is missing, and if a body
+    that is not in the rig has the name of one of its props.
     """
     parts: Mapping[str, BodyConfig] = config.wrists | {prop.name: prop.body for prop in config.objects}
     names = {part: _name(take, body) for part, body in parts.items()}
@@ -82,6 +94,12 @@ def apply_rig(take: Take, config: ActorConfig, where: str) -> Take:
             )
     known = {part: _placed(take.bodies[name], parts[part]) for part, name in names.items() if name is not None}
     others = {name: track for name, track in take.bodies.items() if name not in names.values()}
+    if twice := others.keys() & known.keys():
+        name = min(twice)
+        raise TakeError(
+            f"{where}: calls the body {names[name]!r} {name!r}, but another body of {take.name} has that name; "
+            "rename the prop in the rig"
+        )
     return replace(take, bodies=others | known)
 
 

@@ -3,6 +3,7 @@
 Captured fingers are not used.
 """
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,6 +19,7 @@ from manipnet.tracking.tick import BodyAtTick, Tick
 from manipnet.tracking.timeline import Timeline
 from manipnet_tools.takes.take import Take, TakeError
 
+_log = logging.getLogger(__name__)
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
@@ -98,8 +100,10 @@ class HandMotion:
 def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
     """Stream a take into a `Timeline` and collect the ticks that fall due before it ends.
 
-    The first half second is left out, because its past is not in the take. Raises `TakeError` if nothing remains.
+    The first half second is left out, because its past is not in the take. An object that is never tracked is left out
+    too, and reported. Raises `TakeError` if nothing remains.
     """
+    take = _without_lost_objects(take)
     timeline = Timeline(look_ahead_s)
     ticks: list[Tick] = []
     for frame, time_s in enumerate(take.time_s):
@@ -124,6 +128,14 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
     )
 
 
+def _without_lost_objects(take: Take) -> Take:
+    lost = [name for name in take.objects if not take.bodies[name].tracked.any()]
+    if not lost:
+        return take
+    _log.warning("%s: these bodies are left out because they are never tracked: %s", take.name, ", ".join(lost))
+    return replace(take, bodies={name: track for name, track in take.bodies.items() if name not in lost})
+
+
 def _too_little(take: Take, ticks: Sequence[Tick]) -> str:
     if never := [name for name in take.bodies if not any(name in tick.bodies for tick in ticks)] if ticks else []:
         return f"{take.name}: {', '.join(never)} is never tracked while the other bodies are"
@@ -137,6 +149,8 @@ def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0)
 
     The model's hand has one size, so for hands that are `hand_scale` times as large everything else is made smaller.
     """
+    if lost := [name for name in shapes if name not in ticks.bodies]:
+        raise TakeError(f"{lost[0]} has a mesh but is never tracked in the take")
     windows = np.stack([ticks.bodies[name].windows for name in shapes])
     inputs = {}
     for side in SIDES:

@@ -4,28 +4,32 @@ All are in the project frame: right-handed, Y up, metres, seconds, quaternions x
 `right_wrist` are the wrist frames of `manipnet.synthesis.hand.hand`, the left one its mirror image.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from manipnet.geometry import SIDES, Array, mirror_points, mirror_poses, mirror_quats, quat_multiply, quat_rotate
+from manipnet.geometry import Array
 from manipnet.recording.mcap_file import RecordingError, read_bodies
-from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire.bodies import BodyFrame
-from manipnet_tools.takes.bvh_motion import BvhError, BvhMotion, read_bvh
-from manipnet_tools.takes.motive_csv import MotiveCsvError, read_motive_csv
-from manipnet_tools.takes.trajectory import DECIMETRE_M, TrajectoryError, read_trajectory
+from manipnet_tools.takes.body_names import AmbiguousNameError, take_names
+from manipnet_tools.takes.bvh_folder import read_bvh_folder
+from manipnet_tools.takes.bvh_motion import BvhError
+from manipnet_tools.takes.motive_csv import read_motive_csv
+from manipnet_tools.takes.motive_table import MotiveCsvError
+from manipnet_tools.takes.trajectory import TrajectoryError, read_trajectory
 
-RESTART_S = 0.5
-"""A time this far back is a sender that started again."""
+TRACKED_FORMATS: Final = (".csv", ".mcap")
+"""Formats of tracked bodies, whose up axis the sender chooses."""
+RESTART_S: Final = 0.5
+"""A time that goes back by this much means that the sender has started again."""
 
 
 class TakeError(ValueError):
-    """A take that cannot be read; the text names the file, the place and what was expected."""
+    """A take cannot be read; the text names the file, the place and what was expected."""
 
 
 @dataclass(frozen=True)
@@ -62,20 +66,56 @@ class Take:
         return tuple(name for name in self.bodies if name not in ("left_wrist", "right_wrist"))
 
 
-def read_take(path: Path | str) -> Take:
-    """Read a take: a folder of BVH files, a trajectory text, a Motive CSV or a recording. Raises `TakeError`."""
+def read_take(path: Path | str, keep: Collection[str] = (), up: Literal["y", "z"] = "y") -> Take:
+    """Read a take: a folder of BVH files, a trajectory text, a Motive CSV or a recording.
+
+    Bodies of a Motive CSV that are called like a wrist get its name, except for the names in `keep`. `up` is the axis
+    that points up in a Motive CSV or a recording. Raises `TakeError`.
+    """
     path = Path(path)
-    if path.is_dir():
-        return read_bvh_folder(path)
     if not path.exists():
         raise TakeError(f"{path}: no such take")
-    readers = {".txt": _read_trajectory, ".csv": _read_motive_csv, ".mcap": _read_recording}
-    if path.suffix.lower() not in readers:
-        raise TakeError(f"{path}: unknown kind of take; allowed are a folder of BVH files, {', '.join(readers)}")
+    kind = "folder" if path.is_dir() else path.suffix.lower()
+    readers = {
+        "folder": _read_folder,
+        ".txt": _read_trajectory,
+        ".csv": lambda path: _read_motive_csv(path, keep),
+        ".mcap": _read_recording,
+    }
+    if kind not in readers:
+        allowed = ", ".join(suffix for suffix in readers if suffix != "folder")
+        raise TakeError(f"{path}: {_unknown(kind)}; allowed are a folder of BVH files, {allowed}")
+    if up == "z" and kind not in TRACKED_FORMATS:
+        raise TakeError(f"{path}: --up z is for {' and '.join(TRACKED_FORMATS)} files; this format has its own up axis")
     try:
-        return readers[path.suffix.lower()](path)
-    except (TrajectoryError, MotiveCsvError, RecordingError) as error:
+        take = readers[kind](path)
+    except (BvhError, TrajectoryError, MotiveCsvError, RecordingError) as error:
         raise TakeError(str(error)) from None
+    except (AmbiguousNameError, OSError) as error:
+        raise TakeError(f"{path}: {error}") from None
+    return _y_up(take) if up == "z" else take
+
+
+def _unknown(suffix: str) -> str:
+    """Why a file is not a take."""
+    if suffix == ".bvh":
+        return "a single BVH file is not a take; give its folder, with leftHand.bvh, rightHand.bvh and the objects"
+    if suffix in (".fbx", ".c3d", ".tak"):
+        return f"{suffix} files cannot be read; export the take from its program as CSV"
+    return "unknown kind of take"
+
+
+def _read_folder(folder: Path) -> Take:
+    read = read_bvh_folder(folder)
+    fingers = {side: Fingers(*hand) for side, hand in read.hands.items()}
+    tracks = {
+        f"{side}_wrist": np.concatenate([hand.positions[:, 0], hand.rotations[:, 0]], axis=-1)
+        for side, hand in fingers.items()
+    } | read.objects
+    frames = len(tracks["left_wrist"])
+    seen = np.ones(frames, dtype=np.bool_)
+    bodies = {name: BodyTrack(poses, seen) for name, poses in tracks.items()}
+    return Take(folder.name, read.rate_hz, np.arange(frames) / read.rate_hz, bodies, fingers)
 
 
 def _read_trajectory(path: Path) -> Take:
@@ -86,21 +126,25 @@ def _read_trajectory(path: Path) -> Take:
     return Take(path.stem, rate_hz, time_s, bodies, box_centred=True)
 
 
-def _read_motive_csv(path: Path) -> Take:
-    """Names such as LeftWrist or "left hand" become the conventional ones; the others stay."""
+def _read_motive_csv(path: Path, keep: Collection[str]) -> Take:
     motive = read_motive_csv(path)
-    bodies = {conventional(name): BodyTrack(*track) for name, track in motive.bodies.items()}
+    names = take_names(motive.bodies, keep)
+    bodies = {names[name]: BodyTrack(*track) for name, track in motive.bodies.items()}
     return Take(path.stem, motive.rate_hz, motive.time_s, bodies)
 
 
-def conventional(name: str) -> str:
-    letters = "".join(filter(str.isalpha, name.lower()))
-    sides = [side for side in SIDES if letters in (f"{side}wrist", f"{side}hand")]
-    return f"{sides[0]}_wrist" if sides else name
+def _y_up(take: Take) -> Take:
+    """A take of tracked bodies whose world has Z up, turned to Y up as the server turns a stream of Motive.
+
+    The axes of world and bodies are renamed alike: (x, y, z) becomes (x, z, -y), in rotations too.
+    """
+    axes, signs = [0, 2, 1, 3, 5, 4, 6], np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+    bodies = {name: replace(track, poses=signs * track.poses[:, axes]) for name, track in take.bodies.items()}
+    return replace(take, bodies=bodies)
 
 
 def _read_recording(path: Path) -> Take:
-    """The longest run of a recording's body frames, a run ending where its sender's time began anew."""
+    """The longest run of a recording's body frames, which ends where its sender restarted."""
     runs: list[dict[float, BodyFrame]] = []
     newest_s = np.inf
     for frame in read_bodies(path):
@@ -117,7 +161,10 @@ def _read_recording(path: Path) -> Take:
 
 
 def _tracks(frames: Sequence[BodyFrame]) -> dict[str, BodyTrack]:
-    """Tracks by name, or by id for a body without; a lost body stays where it was last, or will be first."""
+    """Tracks by name, or by id where a body has no name.
+
+    A lost body stays where it was last, and before its first pose it is where it will be first.
+    """
     tracks: dict[str, BodyTrack] = {}
     for k, frame in enumerate(frames):
         for body in frame.bodies:
@@ -133,59 +180,5 @@ def _tracks(frames: Sequence[BodyFrame]) -> dict[str, BodyTrack]:
 
 
 def last_tracked(tracked: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """For each frame the last one at which a body was tracked, or else its first such frame."""
+    """For each frame the last one at which a body was tracked; before that, the first one."""
     return np.maximum.accumulate(np.where(tracked, np.arange(len(tracked)), np.argmax(tracked)))
-
-
-def read_bvh_folder(folder: Path) -> Take:
-    """Read the ManipNet dataset's layout: `leftHand.bvh`, `rightHand.bvh`, one `<object>.bvh` per object."""
-    try:
-        files = {path.stem: read_bvh(path) for path in sorted(folder.glob("*.bvh"))}
-    except BvhError as error:
-        raise TakeError(str(error)) from None
-    missing = {"leftHand", "rightHand"} - files.keys()
-    if missing:
-        raise TakeError(f"{folder}: no {' and no '.join(sorted(missing))}.bvh; a take needs both hands' files")
-    lengths = {stem: len(bvh.motion) for stem, bvh in files.items()}
-    rates = {round(1.0 / bvh.frame_time_s, 3) for bvh in files.values()}
-    if len(set(lengths.values())) > 1 or len(rates) > 1:
-        raise TakeError(f"{folder}: files must share length and rate, found {lengths} frames at {sorted(rates)} Hz")
-    rate_hz = rates.pop()
-    subject = shipped_hand()  # the dataset's subject, whose fingertips its files lack
-    fingers = {side: _hand(folder / f"{side}Hand.bvh", files.pop(f"{side}Hand"), side, subject) for side in SIDES}
-    tracks = {
-        f"{side}_wrist": np.concatenate([hand.positions[:, 0], hand.rotations[:, 0]], axis=-1)
-        for side, hand in fingers.items()
-    }
-    tracks |= {stem: _root_poses(bvh) for stem, bvh in files.items()}
-    frames = len(tracks["left_wrist"])
-    seen = np.ones(frames, dtype=np.bool_)
-    bodies = {name: BodyTrack(poses, seen) for name, poses in tracks.items()}
-    return Take(folder.name, rate_hz, np.arange(frames) / rate_hz, bodies, fingers)
-
-
-def _root_poses(bvh: BvhMotion) -> Array:
-    """Poses `(T, 7)` of the root, from left-handed decimetres to the project frame."""
-    root = BvhMotion(bvh.joints[:1], bvh.frame_time_s, bvh.motion[:, : len(bvh.joints[0].channels)])
-    translations, rotations = root.local_transforms()
-    return mirror_poses(np.concatenate([DECIMETRE_M * translations[:, 0], rotations[:, 0]], axis=-1))
-
-
-def _hand(path: Path, bvh: BvhMotion, side: str, subject: Hand) -> Fingers:
-    """World joints and bone rotations; the tips, which the files lack, come from the `subject`."""
-    names = [joint.name for joint in bvh.joints]
-    expected, bones = subject.joint_names[: subject.bone_count], subject.bone_count
-    if names != list(expected):
-        raise TakeError(f"{path}: joints must be {' '.join(expected)}, found {' '.join(names)}")
-    translations, rotations = bvh.local_transforms()
-    translations, local = DECIMETRE_M * mirror_points(translations), mirror_quats(rotations)
-    tips = subject.offsets[bones:] if side == "right" else mirror_points(subject.offsets[bones:])
-    positions = np.empty((len(local), subject.joint_count, 3))
-    world = np.empty((len(local), bones, 4))
-    positions[:, 0], world[:, 0] = translations[:, 0], local[:, 0]
-    for j, parent in enumerate(subject.parents[1:], start=1):
-        offset = translations[:, j] if j < bones else tips[j - bones]
-        positions[:, j] = positions[:, parent] + quat_rotate(world[:, parent], offset)
-        if j < bones:
-            world[:, j] = quat_multiply(world[:, parent], local[:, j])
-    return Fingers(positions, world)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from manipnet.geometry import Array, mirror_poses, quat_normalize
+from manipnet_tools.takes.text_file import read_text
 
 DECIMETRE_M = 0.1
 """The unit of length in the files of the dataset."""
@@ -23,8 +24,8 @@ class TrajectoryError(ValueError):
 def read_trajectory(path: Path) -> tuple[float, dict[str, Array]]:
     """Rate in hertz and poses `(T, 7)` by `BODIES`, in the project frame. Raises `TrajectoryError`."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_text(path).splitlines()
+    except OSError as error:
         raise TrajectoryError(f"{path}: cannot be read ({error})") from None
     rate_hz = _rate(lines[0] if lines else "", path)
     rows = [_row(line, f"{path}:{number}") for number, line in enumerate(lines[1:], start=2) if line.strip()]

@@ -1,8 +1,8 @@
-"""Poses to train on besides the captured ones: blended away from them, and reached by the model itself.
+"""Further poses to train on: captured poses that are blended with others, and poses that the model itself reaches.
 
 Whatever pose a tick starts from, the answer is the captured next pose plus the part of the error that may remain after
-one tick (`residual_error`). So a hand that went astray returns over a few ticks instead of jumping back in one, which
-made earlier models jitter.
+one tick (`residual_error`). A hand that has drifted away then returns over a few ticks. Earlier models had to
+return within one tick, which made them jitter.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,19 +15,19 @@ from manipnet.synthesis.hand.hand import Hand
 from manipnet_tools.training.dataset import TICK_FRAMES, CapturedHand, Samples, concatenate, samples_at
 
 Policy = Callable[[np.ndarray], Array]
-"""From feature rows `(N, input_size)` to angles `(N, A)` inside the limits."""
+"""Maps feature rows `(N, input_size)` to angles `(N, A)` inside the limits."""
 
 
 @dataclass(frozen=True)
 class AnswerRule:
-    """Which pose the network is to answer with."""
+    """Which pose the network should answer with."""
 
     residual_error: float
     """Share of a pose error that may remain after one tick."""
     lead_frames: float
-    """How many captured frames the answered pose is ahead of the tick: the lag of the smoothing after the network."""
+    """By how many captured frames the answer leads the tick, to compensate for the smoothing after the network."""
     response: float
-    """Share of the way to the answer that a hand goes in one tick."""
+    """Share of the way to the answer that a hand moves in one tick."""
 
 
 def answer(before: Array, captured_before: Array, captured: Array, residual_error: float) -> Array:

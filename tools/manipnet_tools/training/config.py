@@ -1,4 +1,4 @@
-"""What is trained and how."""
+"""The recipe of a model: its architecture, its samples and its optimiser."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -19,9 +19,9 @@ class TrainConfig:
     hidden: tuple[str, ...] = ()
     """Inputs that the network does not see: names of blocks, or `future`."""
     dropout: float = 0.3
-    """Share of the activations that is dropped in training."""
+    """Share of the activations that are dropped in training."""
     rounds: int = 4
-    """How often new samples are made."""
+    """Number of rounds, each with new samples."""
     epochs_per_round: int = 5
     """Passes over the samples of a round."""
     batch: int = 128
@@ -29,15 +29,15 @@ class TrainConfig:
     learning_rate: float = 7e-4
     """Step size of the optimiser at the start; it falls to a fiftieth along a cosine."""
     weight_decay: float = 1e-2
-    """Pull of the optimiser on the weights toward zero."""
+    """Weight decay of the optimiser."""
     huber: float = 0.5
-    """Errors beyond this many deviations count by their size instead of its square; 0 squares all."""
+    """Errors beyond this many standard deviations count linearly instead of squared; 0 squares all errors."""
     weight_average: float = 0.999
-    """Decay of the running average of the weights, which is what is shipped; 0 ships the last weights."""
+    """Decay of the running average of the weights that is shipped; with 0, the last weights are shipped."""
     residual_error: float = 0.0
     """Share of a pose error that may remain after one tick."""
     response: float = 0.5
-    """Share of the way to the answer that a hand goes in one tick; the answer is ahead by the lag of that."""
+    """Share of the way to the answer that a hand moves in one tick. The answer leads by the lag that this causes."""
     captured: float = 0.3
     """Samples at captured poses, per captured frame and round."""
     blended: float = 0.6

@@ -1,4 +1,4 @@
-"""Captured hands, and training samples made from them by the live server's own features.
+"""Captured hands, and training samples that the live server's own features make from them.
 
 A sample of tick `k` is what the server would see there (trajectories, and sensors at the pose of tick `k - 1`) and the
 pose that the network should answer with. Hands keep the 120 Hz of the capture, so that every second frame, counted from
@@ -11,7 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from manipnet.geometry import Array, continuous_quats, mirror_points, mirror_poses, mirror_quats, quat_to_matrix
+from manipnet.geometry import (
+    SIDES,
+    Array,
+    Side,
+    continuous_quats,
+    invert,
+    mirror_points,
+    mirror_poses,
+    mirror_quats,
+    quat_to_matrix,
+    transform,
+)
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import angles_from_rotations, forward_kinematics
 from manipnet.synthesis.model.features import Windows, features, joint_distances, pose_outputs
@@ -19,21 +30,24 @@ from manipnet.synthesis.model.layout import WINDOW_STEP_S
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.shape import Shape, load_shape
 from manipnet_tools.takes.dataset import mesh_file, take_folders
+from manipnet_tools.takes.sources import captured_sides
 from manipnet_tools.takes.take import Take, read_take
 
 CAPTURE_HZ = 120
 TICK_FRAMES = 2
 """Frames of the capture per tick of the server."""
+HANDLED_FRAMES = 200
+"""Frames of a take by which the object that a hand handles is found."""
 _WINDOW_FRAMES = round(WINDOW_STEP_S * CAPTURE_HZ) * np.arange(-10, 11)
 
 
 @dataclass(frozen=True, eq=False)
 class CapturedHand:
-    """One hand of a take as the network sees it: at 120 Hz, a left hand mirrored into a right one."""
+    """One hand of a take as the network sees it, at 120 Hz. A left hand is mirrored into a right one."""
 
     name: str
     hand: Hand
-    """The subject's."""
+    """The hand of the captured subject."""
     shape: Shape
     mirrored: bool
     wrist: Array
@@ -43,7 +57,7 @@ class CapturedHand:
     object: Array
     """`(T, 7)`"""
     angles: Array
-    """`(T, A)` captured fingers."""
+    """`(T, A)` captured joint angles."""
 
     def __len__(self) -> int:
         return len(self.wrist)
@@ -54,7 +68,7 @@ class CapturedHand:
         return replace(self, **flipped)
 
     def windows(self, frames: np.ndarray, speed: Array | None = None) -> Windows:
-        """Windows about `frames (N,)`; the first and last frame of the take stand still beyond it.
+        """Windows around `frames (N,)`. Beyond the ends of the take, the motion stands still.
 
         `speed (N,)` plays time faster or slower.
         """
@@ -88,11 +102,15 @@ def continuous(poses: Array) -> Array:
     return np.concatenate([poses[:, :3], continuous_quats(poses[:, 3:])], axis=1)
 
 
-def captured_hands(take: Take, shapes: dict[str, Shape]) -> list[CapturedHand]:
-    """Both hands of a take with captured fingers; `shapes` by object name."""
-    name, subject = take.objects[0], shipped_hand()
+def captured_hands(take: Take, shapes: dict[str, Shape], sides: Sequence[Side] = SIDES) -> list[CapturedHand]:
+    """The hands of a take with captured fingers, each with the object that it handles; `shapes` by object name."""
+    subject = shipped_hand()
     hands = []
-    for side, other in (("right", "left"), ("left", "right")):
+    pairs: tuple[tuple[Side, Side], ...] = (("right", "left"), ("left", "right"))
+    for side, other in pairs:
+        if side not in sides:
+            continue
+        name = handled(take, side, shapes)
         mirrored = side == "left"
         quats = take.fingers[side].rotations
         wrist, obj = take.bodies[f"{side}_wrist"].poses, take.bodies[name].poses
@@ -118,6 +136,20 @@ def captured_hands(take: Take, shapes: dict[str, Shape]) -> list[CapturedHand]:
     return hands
 
 
+def handled(take: Take, side: Side, shapes: dict[str, Shape]) -> str:
+    """The object that a hand handles in a take: the one to which its knuckles and fingertips are nearest on average."""
+    if len(shapes) == 1:
+        return next(iter(shapes))
+    frames = slice(None, None, max(len(take.time_s) // HANDLED_FRAMES, 1))
+    joints = take.fingers[side].positions[frames]
+
+    def distance_m(name: str) -> float:
+        local = transform(invert(take.bodies[name].poses[frames])[:, None], joints)
+        return float(np.maximum(shapes[name].signed_distance(local.reshape(-1, 3))[0], 0.0).mean())
+
+    return min(shapes, key=distance_m)
+
+
 def load_captured_hands(data: Path, takes: Sequence[str] = ()) -> list[CapturedHand]:
     """All hands of the takes in `data/BVH`, or of those named, with meshes from `data/meshes`.
 
@@ -126,7 +158,8 @@ def load_captured_hands(data: Path, takes: Sequence[str] = ()) -> list[CapturedH
     hands = []
     for folder in take_folders(data, takes):
         take = read_take(folder)
-        hands += captured_hands(take, {name: load_shape(mesh_file(data, name)) for name in take.objects})
+        shapes = {name: load_shape(mesh_file(data, name)) for name in take.objects}
+        hands += captured_hands(take, shapes, captured_sides(data, folder.name))
     return hands
 
 
@@ -149,9 +182,9 @@ def concatenate(parts: Sequence[Samples]) -> Samples:
 def samples_at(
     captured: CapturedHand, frames: np.ndarray, before: Array, after: Array, windows: Windows | None = None
 ) -> Samples:
-    """Samples of ticks at `frames (N,)`: the server sees the pose `before (N, A)`, and `after (N, A)` is the answer.
+    """Samples of ticks at `frames (N,)`: the network sees the pose `before (N, A)`, and `after (N, A)` is the answer.
 
-    `windows` are the trajectories about the frames, by default those at the speed of the capture.
+    `windows` are the trajectories around the frames, by default at the speed of the capture.
     """
     windows = captured.windows(frames) if windows is None else windows
     hand, shape = captured.hand, captured.shape

@@ -83,7 +83,7 @@ _FUTURE = {
 
 
 def hidden_columns(layout: Layout, names: Sequence[str]) -> np.ndarray:
-    """Mask `(input_size,)` of the inputs that block names, or `future` (more than 0.1 s ahead), stand for."""
+    """Mask `(input_size,)` of the inputs in the named blocks; `future` names everything more than 0.1 s ahead."""
     mask = np.zeros(layout.input_size, dtype=np.bool_)
     for name in names:
         if name == "future":
@@ -113,7 +113,7 @@ class ResidualDenseBlock(nn.Module):
 
 
 class ManipNet(nn.Module):
-    """The network: three linear encoders, two residual dense blocks, a linear decoder. SI units in and out."""
+    """The network: three linear encoders, two residual dense blocks and a linear decoder. It works in SI units."""
 
     input_mean: torch.Tensor
     input_gain: torch.Tensor
@@ -151,7 +151,7 @@ class ManipNet(nn.Module):
                 nn.init.zeros_(layer.bias)
 
     def normalised(self, features: torch.Tensor) -> torch.Tensor:
-        """Outputs in standard deviations from their mean, which is what the loss sees."""
+        """Outputs in standard deviations from their mean, of which the loss is made."""
         x = (features - self.input_mean) * self.input_gain
         parts = [
             encode(self.dropout(part))
@@ -160,7 +160,7 @@ class ManipNet(nn.Module):
         return self.decoder(self.dropout(self.blocks(torch.cat(parts, dim=1))))
 
     def normalise_outputs(self, features: torch.Tensor, outputs: torch.Tensor) -> torch.Tensor:
-        """What `normalised` should answer for these outputs."""
+        """The answer of `normalised` that stands for these outputs."""
         return (outputs - self._base_pose(features) - self.output_mean) / self.output_std
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:

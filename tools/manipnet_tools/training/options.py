@@ -5,6 +5,8 @@ from pathlib import Path
 
 from tyro.conf import Positional
 
+from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.takes.dataset import DataError, take_folders
 from manipnet_tools.training.config import TrainConfig
 
 
@@ -22,6 +24,19 @@ class TrainOptions:
     """Train on this share of each take, from its start; 0.8 leaves what `manipnet evaluate` tests as seen."""
     training: TrainConfig = field(default_factory=TrainConfig)
 
+    def check(self) -> None:
+        """Raise `DataError` unless there are takes to train on."""
+        self.takes()
+
+    def takes(self) -> list[str]:
+        """Names of the takes to train on. Raises `DataError` if there are none."""
+        names = [folder.name for folder in take_folders(self.data)]
+        if unknown := set(self.leave_out) - set(names):
+            raise DataError(f"--leave-out {min(unknown)}: the takes of {self.data} are {', '.join(names)}")
+        if not (left := [name for name in names if name not in self.leave_out]):
+            raise DataError(f"--leave-out names every take of {self.data}; leave some to train on")
+        return left
+
 
 @dataclass(frozen=True)
 class QuantiseOptions:
@@ -31,3 +46,7 @@ class QuantiseOptions:
     """The bundle: the name of a shipped one, or its folder."""
     out: Path
     """Folder of the bundle to write."""
+
+    def check(self) -> None:
+        """Raise `BundleError` for a bundle that does not exist."""
+        find_bundle(self.model)

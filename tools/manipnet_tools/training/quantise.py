@@ -1,22 +1,18 @@
-"""Smaller model files: weights in half precision, cast on load; and 8-bit weights, in wide layers 4-bit ones."""
-
-import hashlib
-import json
+"""Makes model files smaller: half-precision weights that are cast on load, or 8-bit weights, 4-bit in wide layers."""
 
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
-from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.bundle import NETWORK_FILE, load_bundle, write_bundle
 from manipnet_tools.training.options import QuantiseOptions
 
 _LEAST_VALUES = 4096
 """Smaller tensors (biases, normalisation) keep full precision."""
 _BLOCK = 32
-"""Neighbouring weights, or activations, that share a scale; with 64 and 128 idle hands tremble more."""
+"""Number of neighbouring weights, or activations, that share a scale. With 64 or 128, idle hands tremble more."""
 _WIDE = 1024
-"""Matrices of at least this size in both directions can take 4 bits; with them the narrow network errs a tenth more."""
+"""Matrices of at least this size in both directions have 4 bits. With 4 bits, the narrow network errs a tenth more."""
 
 
 def halve_weights(content: bytes) -> bytes:
@@ -124,14 +120,6 @@ def _in_few_bits(gemm: onnx.NodeProto, outputs: int, inputs: int, bits: int, wei
 def run(options: QuantiseOptions) -> None:
     """Quantise a bundle and write it. Raises `BundleError`."""
     bundle = load_bundle(options.model)
-    source = (bundle.folder / "manipnet.onnx").read_bytes()
-    content = quantise_weights(single_precision(source))
-    meta = {
-        **bundle.meta,
-        "model_sha256": hashlib.sha256(content).hexdigest(),
-        "quantised_from_sha256": hashlib.sha256(source).hexdigest(),
-    }
-    options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "manipnet.onnx").write_bytes(content)
-    write_hand(bundle.hand, options.out / HAND_FILE)
-    (options.out / "bundle.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")
+    network = quantise_weights(single_precision((bundle.folder / NETWORK_FILE).read_bytes()))
+    meta = bundle.meta | {"quantised_from_sha256": bundle.meta["model_sha256"]}
+    write_bundle(options.out, network, bundle.hand, meta)

@@ -1,4 +1,4 @@
-"""Training samples of some captured hands, made anew for every round."""
+"""Makes the training samples of captured hands, new ones for each round."""
 
 from collections.abc import Sequence
 
@@ -12,19 +12,19 @@ from manipnet_tools.training.model import ManipNet, policy_of
 
 LIMIT_MARGIN_RAD = np.radians(7.0)
 FUTURE_FRAMES = 60
-"""Frames of the future that a window sees: samples end this long before a span ends, so that no frame of a test is seen
-in training."""
+"""Frames of the future in a window. Samples end this long before the end of a span, so that training sees no frame of a
+test."""
 
 
 class RoundSampler:
-    """Makes the samples of each round, and knows the limits and the rest pose of the captured hands."""
+    """Makes the samples of each round, and determines the limits and the rest pose of the captured hands."""
 
     def __init__(self, hands: Sequence[CapturedHand], config: TrainConfig, share: float) -> None:
-        """The first `share` of every take is used. All hands are of the same subject."""
+        """Use the first `share` of every take. All hands must be those of the same subject."""
         self._spans = spans_of(hands, share)
         self._hands, self._config = list(hands), config
         self.hand = hands[0].hand
-        """The hand to be posed."""
+        """The hand that the network poses."""
         self._rng = np.random.default_rng(config.seed)
         seen = [captured.angles[low:high:4] for captured, (low, high) in zip(hands, self._spans, strict=True)]
         self._pool = np.concatenate(seen)

@@ -1,8 +1,9 @@
-"""`manipnet train`: from captured takes to a bundle."""
+"""`manipnet train`: trains a model on captured takes, and writes a bundle."""
 
 import logging
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -10,7 +11,7 @@ import torch
 
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.layout import layout_of
-from manipnet_tools.takes.dataset import DataError, take_folders
+from manipnet_tools.takes.sources import licence_of
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, Samples, load_captured_hands
 from manipnet_tools.training.model import ManipNet, normalisation
@@ -22,7 +23,7 @@ _log = logging.getLogger(__name__)
 
 
 class Trainer:
-    """One model in training: it learns round by round, at a falling rate."""
+    """Trains one model, round by round, at a falling learning rate."""
 
     def __init__(self, hand: Hand, first: Samples, config: TrainConfig) -> None:
         """The normalisation is taken from the `first` samples."""
@@ -42,7 +43,7 @@ class Trainer:
 
     @property
     def model(self) -> ManipNet:
-        """The model that would be shipped now."""
+        """The model as it would be shipped now."""
         return cast(ManipNet, self._average.module) if self._config.weight_average else self._last
 
     def learn(self, samples: Samples) -> float:
@@ -78,8 +79,8 @@ class Trainer:
 def train(hands: Sequence[CapturedHand], config: TrainConfig, share: float = 1.0) -> Trained:
     """Train on the first `share` of each take.
 
-    The result is the same for the same seed. It takes one thread, because with the small batches that train best a
-    second thread waits more than it works.
+    The same seed gives the same result. Training uses one thread, because with the small batches that train best, a
+    second thread mostly waits.
     """
     started = time.monotonic()
     torch.set_num_threads(1)
@@ -105,7 +106,7 @@ def trained(
     share: float,
     seconds: float,
 ) -> Trained:
-    """The model as it is now, with what a bundle needs besides."""
+    """The model as it is now, with everything else that a bundle needs."""
     takes = tuple(sorted({captured.name.split("/")[0] for captured in hands}))
     model, rest_angles, limits = trainer.model.eval(), sampler.rest_angles, sampler.limits
     return Trained(model, sampler.hand, rest_angles, limits, config, takes, share, seconds)
@@ -113,7 +114,6 @@ def trained(
 
 def run(options: TrainOptions) -> None:
     """Train and write the bundle. Raises `DataError`, `TakeError` and `MeshError`."""
-    names = [folder.name for folder in take_folders(options.data) if folder.name not in options.leave_out]
-    if not names:
-        raise DataError(f"--leave-out names every take of {options.data}; leave some to train on")
-    save_bundle(train(load_captured_hands(options.data, names), options.training, options.share), options.out)
+    names = options.takes()
+    trained = train(load_captured_hands(options.data, names), options.training, options.share)
+    save_bundle(replace(trained, licence=licence_of(options.data, names)), options.out)

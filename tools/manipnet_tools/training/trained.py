@@ -1,7 +1,5 @@
-"""A trained model, and the bundle that is made of it."""
+"""A trained model, and how it becomes a bundle."""
 
-import hashlib
-import json
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -10,19 +8,16 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
-from manipnet.synthesis.model.bundle import FORMAT
-from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.bundle import write_bundle
+from manipnet_tools.takes.sources import MANIPNET_LICENCE
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.model import ManipNet, export_onnx
 from manipnet_tools.training.quantise import halve_weights
 
-LICENCE = "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura"
-
 
 @dataclass(frozen=True, eq=False)
 class Trained:
-    """A trained model with what a bundle needs besides."""
+    """A trained model with everything else that a bundle needs."""
 
     model: ManipNet
     hand: Hand
@@ -37,29 +32,24 @@ class Trained:
     """Share of each take that was used, from its start."""
     seconds: float
     """Time that training took."""
+    licence: str = MANIPNET_LICENCE
+    """The terms of the takes, which are those of the model."""
 
 
 def save_bundle(trained: Trained, folder: Path) -> None:
     """Write `manipnet.onnx`, `hand.npz` and `bundle.json`."""
-    folder.mkdir(parents=True, exist_ok=True)
-    content = halve_weights(export_onnx(trained.model))
-    (folder / "manipnet.onnx").write_bytes(content)
-    write_hand(trained.hand, folder / HAND_FILE)
+    training = {
+        **asdict(trained.config),
+        "takes": list(trained.takes),
+        "share": trained.share,
+        "minutes": round(trained.seconds / 60, 1),
+        "date": date.today().isoformat(),
+    }
     meta = {
-        "format": FORMAT,
-        "layout": layout_of(trained.hand).describe(),
-        "angle_names": list(trained.hand.angle_names),
         "rest_angles_rad": [round(float(a), 6) for a in trained.rest_angles],
         "response": trained.config.response,
         "limits_rad": np.round(trained.limits, 6).tolist(),
-        "model_sha256": hashlib.sha256(content).hexdigest(),
-        "training": {
-            **asdict(trained.config),
-            "takes": list(trained.takes),
-            "share": trained.share,
-            "minutes": round(trained.seconds / 60, 1),
-            "date": date.today().isoformat(),
-        },
-        "licence": LICENCE,
+        "training": training,
+        "licence": trained.licence,
     }
-    (folder / "bundle.json").write_text(json.dumps(meta, indent=1) + "\n", encoding="utf-8")
+    write_bundle(folder, halve_weights(export_onnx(trained.model)), trained.hand, meta)

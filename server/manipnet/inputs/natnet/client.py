@@ -271,7 +271,7 @@ class NatNetBodies(Receiver):
 
     def _take_frame(self, payload: bytes, source: str, now_s: float) -> None:
         if self._info is None:
-            self._intake.drop("unsupported", source, "a frame arrived before the server had told its version")
+            self._intake.drop("unsupported", source, "a frame arrived before the server had sent its version")
             return
         frame = read_frame(payload, self._info.version)
         if frame.exposed_ticks and self._info.clock_hz:

@@ -42,7 +42,7 @@ class Definitions:
             names_of.setdefault(id, []).append(name)
             ids_of.setdefault(name, []).append(id)
         return [
-            f"{' and '.join(map(repr, names))} have the streaming id {id}, so none is used; give each its own"
+            f"{' and '.join(map(repr, names))} have the streaming id {id}, so none is used; give each its own id"
             for id, names in names_of.items()
             if len(names) > 1
         ] + [

@@ -2,7 +2,8 @@
 
 What is not used (markers, assets, force plates, devices) is counted and skipped: from 4.1 on by the byte size that
 follows each count, and before by its layout. Before 3.0, each body is followed by its markers. Sources: PacketClient
-and the Python client of the NatNet SDK, which name the version of each field. `read_frame` raises only `MessageError`.
+and the Python client of the NatNet SDK, whose readers name the version of each field. `read_frame` raises
+`MessageError` and nothing else.
 """
 
 import struct

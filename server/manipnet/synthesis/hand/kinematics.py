@@ -9,7 +9,7 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, matrix, stack_array
-from manipnet.synthesis.hand.hand import MAX_ANGLES, Hand, Skeleton
+from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, Chains, Hand, Skeleton
 from manipnet.synthesis.hand.packed import unpack_skeleton
 from manipnet.synthesis.rotations import (
     axis_rotation_into,
@@ -30,31 +30,60 @@ def _apply_offset_into(parent_position: Array, parent_rotation: Array, offset: A
 
 
 @inner
+def pose_bone_into(skeleton: Skeleton, bone: int, angles: Array, positions: Array, rotations: Array, axes: Array):
+    """Place one bone after its parent: row `bone` of `positions (J, 3)` and `rotations (B, 3, 3)`, and its `axes`."""
+    hinges, hinge, turned = skeleton.axes, matrix(), matrix()
+    parent = skeleton.parents[bone]
+    _apply_offset_into(positions[parent], rotations[parent], skeleton.offsets[bone], positions[bone])
+    frame = rotations[bone]
+    copy_matrix_into(rotations[parent], frame)
+    first = skeleton.first_angle[bone]
+    for angle in range(first, first + skeleton.angle_counts[bone]):
+        for i in range(3):
+            axes[angle, i] = (
+                frame[i, 0] * hinges[angle, 0] + frame[i, 1] * hinges[angle, 1] + frame[i, 2] * hinges[angle, 2]
+            )
+        axis_rotation_into(hinges[angle], angles[angle], hinge)
+        multiply_matrices_into(frame, hinge, turned)
+        copy_matrix_into(turned, frame)
+    multiply_matrices_into(frame, skeleton.rest[bone], turned)
+    copy_matrix_into(turned, frame)
+
+
+@inner
+def pose_tip_into(skeleton: Skeleton, tip: int, positions: Array, rotations: Array):
+    """Place one fingertip after its bone."""
+    parent = skeleton.parents[tip]
+    _apply_offset_into(positions[parent], rotations[parent], skeleton.offsets[tip], positions[tip])
+
+
+@inner
 def forward_kinematics_into(skeleton: Skeleton, angles: Array, positions: Array, rotations: Array, axes: Array):
     """Pose one hand: `angles (A,)` into `positions (J, 3)`, `rotations (B, 3, 3)` and hinge `axes (A, 3)`."""
-    parents, offsets, hinges, bones = skeleton.parents, skeleton.offsets, skeleton.axes, len(skeleton.rest)
-    hinge, turned = matrix(), matrix()
+    bones = len(skeleton.rest)
     positions[0] = 0.0
     set_identity(rotations[0])
     for bone in range(1, bones):
-        parent = parents[bone]
-        _apply_offset_into(positions[parent], rotations[parent], offsets[bone], positions[bone])
-        frame = rotations[bone]
-        copy_matrix_into(rotations[parent], frame)
-        first = skeleton.first_angle[bone]
-        for angle in range(first, first + skeleton.angle_counts[bone]):
-            for i in range(3):
-                axes[angle, i] = (
-                    frame[i, 0] * hinges[angle, 0] + frame[i, 1] * hinges[angle, 1] + frame[i, 2] * hinges[angle, 2]
-                )
-            axis_rotation_into(hinges[angle], angles[angle], hinge)
-            multiply_matrices_into(frame, hinge, turned)
-            copy_matrix_into(turned, frame)
-        multiply_matrices_into(frame, skeleton.rest[bone], turned)
-        copy_matrix_into(turned, frame)
-    for tip in range(bones, len(parents)):
-        parent = parents[tip]
-        _apply_offset_into(positions[parent], rotations[parent], offsets[tip], positions[tip])
+        pose_bone_into(skeleton, bone, angles, positions, rotations, axes)
+    for tip in range(bones, len(skeleton.parents)):
+        pose_tip_into(skeleton, tip, positions, rotations)
+
+
+@inner
+def pose_finger_into(
+    skeleton: Skeleton, chains: Chains, finger: int, angles: Array, positions: Array, rotations: Array, axes: Array
+):
+    """Pose one finger of a hand that `forward_kinematics_into` has posed before; the other fingers stay as they are."""
+    bones = len(skeleton.rest)
+    pose_bone_into(skeleton, skeleton.parents[chains.joints[finger, 0]], angles, positions, rotations, axes)
+    for k in range(CHAIN_LENGTH):
+        joint = chains.joints[finger, k]
+        if joint < 0:
+            continue
+        if joint < bones:
+            pose_bone_into(skeleton, joint, angles, positions, rotations, axes)
+        else:
+            pose_tip_into(skeleton, joint, positions, rotations)
 
 
 @inner

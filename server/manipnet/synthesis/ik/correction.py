@@ -8,17 +8,18 @@ from typing import NamedTuple
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, matrix, stack_array, vector
-from manipnet.synthesis.hand.hand import MAX_JOINTS, Chains, Skeleton
+from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Chains, Skeleton
 from manipnet.synthesis.ik.ccd import solve_ccd
 from manipnet.synthesis.ik.chains import Surface, clamp
 from manipnet.synthesis.ik.grasp import grasp_confidence
+from manipnet.synthesis.ik.grip import Grip
 from manipnet.synthesis.ik.least_squares import solve_least_squares
 from manipnet.synthesis.ik.targets import place_targets
 from manipnet.synthesis.model.layout import PRESENT
 from manipnet.synthesis.objects.shape import Solid
 from manipnet.synthesis.sensing.scene import object_from_wrist
 
-_targets = stack_array(MAX_JOINTS, 3)
+_targets, _reference = stack_array(MAX_JOINTS, 3), stack_array(MAX_ANGLES)
 FADE_SHARE = 0.6
 """Share of the way to a new correction that one tick goes, so that fingers do not pop."""
 
@@ -45,6 +46,8 @@ class Problem(NamedTuple):
     """`(J, 3)` joints of the predicted pose."""
     distances: Array
     """`(J,)` from the joints to the surface as predicted, metres."""
+    grip: Grip
+    """What the hand remembers of its grip."""
 
 
 @inner
@@ -80,6 +83,35 @@ def correct_by_least_squares(problem: Problem, angles: Array, correction: Array)
         confidence,
         problem.limits,
         surface,
+        problem.grip.weights,
+        problem.grip.anchors,
+        angles,
+    )
+    _fade(problem, angles, correction)
+
+
+@inner
+def correct_by_wrench(problem: Problem, angles: Array, correction: Array):
+    """Damped least squares in which fingers that carry the object have poses of their own."""
+    rotation, translation, targets, reference = matrix(), vector(), _targets(), _reference()
+    surface = _place_surface(problem, rotation, translation, targets)
+    confidence = grasp_confidence(problem.wrist, problem.object, problem.other_wrist)
+    grip = problem.grip
+    for angle in range(len(angles)):
+        reference[angle] = clamp(problem.predicted[angle] + grip.offsets[angle], problem.limits, angle)
+    for angle in range(len(angles)):
+        angles[angle] = clamp(problem.predicted[angle] + correction[angle], problem.limits, angle)
+    solve_least_squares(
+        problem.skeleton,
+        problem.chains,
+        reference,
+        targets,
+        problem.distances,
+        confidence,
+        problem.limits,
+        surface,
+        grip.weights,
+        grip.anchors,
         angles,
     )
     _fade(problem, angles, correction)

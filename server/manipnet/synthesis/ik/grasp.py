@@ -67,6 +67,18 @@ def grasp_confidence(wrist: Array, obj: Array, other: Array):
 
 
 @inner
+def finger_clearance(chains: Chains, finger: int, distances: Array):
+    """How far from the object the nearest capsule of a finger is predicted to be, from the joints' `distances (J,)`."""
+    nearest = np.inf
+    for k in range(CHAIN_LENGTH):
+        c = chains.capsules[finger, k]
+        if c >= 0:
+            clearance = min(distances[chains.starts[c]], distances[chains.ends[c]]) - chains.radii[c]
+            nearest = min(nearest, max(clearance, 0.0))
+    return nearest
+
+
+@inner
 def finger_confidences_into(chains: Chains, distances: Array, confidence: float, out: Array):
     """How certain it is that each finger takes part in a grasp that is certain with `confidence`, into `out (F,)`.
 
@@ -74,12 +86,7 @@ def finger_confidences_into(chains: Chains, distances: Array, confidence: float,
     """
     fingers, nearest = len(chains.angles), np.inf
     for finger in range(1, fingers):
-        out[finger] = np.inf
-        for k in range(CHAIN_LENGTH):
-            c = chains.capsules[finger, k]
-            if c >= 0:
-                clearance = min(distances[chains.starts[c]], distances[chains.ends[c]]) - chains.radii[c]
-                out[finger] = min(out[finger], max(clearance, 0.0))
+        out[finger] = finger_clearance(chains, finger, distances)
         nearest = min(nearest, out[finger])
     out[0] = confidence
     for finger in range(1, fingers):

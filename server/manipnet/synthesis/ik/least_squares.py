@@ -7,12 +7,13 @@ and take microseconds. Capsules meet the distance field, not the triangles: it i
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.jit import inner, stack_array
+from manipnet.jit import inner, stack_array, vector
 from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_FINGERS, MAX_JOINTS, Chains, Skeleton
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.ik.chains import Surface, angle_moves, capsule_sample, clamp
 from manipnet.synthesis.ik.depenetration import open_deep_fingers
 from manipnet.synthesis.ik.grasp import finger_confidences_into
+from manipnet.synthesis.ik.grip import ANCHOR
 from manipnet.synthesis.sensing.scene import map_direction_back
 
 ITERATIONS = 4
@@ -22,6 +23,10 @@ TARGET_WEIGHT = 1.0
 SURFACE_WEIGHT = 6.0
 STAY_WEIGHT_M2 = 4e-5
 """Pull toward the network's angles, in square metres per square radian."""
+GRIP_WEIGHT_M2 = 4e-3
+"""The same for the angles of a finger that has a pose of its own, because it carries."""
+ANCHOR_WEIGHT = 1.5
+"""Pull of a fingertip toward the place where it touched the object."""
 ALLOWED_DEPTH_M = 0.002
 """Skin gives way: the captured fingers are about this deep where they press."""
 PULL_WEIGHT = 3.0
@@ -54,11 +59,13 @@ def _add_targets(
     positions: Array,
     axes: Array,
     targets: Array,
+    weight: float,
     normal: Array,
     slope: Array,
 ):
     """Add the finger's joints, pulled to their `targets (J, 3)`, to its normal equations."""
     columns = _columns()
+    weight *= TARGET_WEIGHT
     for joint in range(CHAIN_LENGTH):
         j = chains.joints[finger, joint]
         if j < 0:
@@ -78,10 +85,54 @@ def _add_targets(
                 columns[k, 0], columns[k, 1], columns[k, 2] = x, y, z
         for a in range(CHAIN_LENGTH):
             for i in range(3):
-                slope[a] += TARGET_WEIGHT * columns[a, i] * (targets[j, i] - positions[j, i])
+                slope[a] += weight * columns[a, i] * (targets[j, i] - positions[j, i])
             for b in range(a + 1):
                 for i in range(3):
-                    normal[a, b] += TARGET_WEIGHT * columns[a, i] * columns[b, i]
+                    normal[a, b] += weight * columns[a, i] * columns[b, i]
+
+
+@inner
+def _add_anchor(
+    skeleton: Skeleton,
+    chains: Chains,
+    finger: int,
+    positions: Array,
+    axes: Array,
+    anchor: Array,
+    surface: Surface,
+    normal: Array,
+    slope: Array,
+):
+    """Add the fingertip, held at its place on the object, to the finger's normal equations."""
+    columns, apart, tip = _columns(), vector(), -1
+    for k in range(CHAIN_LENGTH):
+        if chains.joints[finger, k] >= 0:
+            tip = chains.joints[finger, k]
+    r, t = surface.rotation, surface.translation
+    for i in range(3):
+        apart[i] = -positions[tip, i]
+        for j in range(3):
+            apart[i] += r[j, i] * (anchor[1 + j] * surface.scale - t[j])
+    weight = ANCHOR_WEIGHT * anchor[0]
+    bone = skeleton.parents[tip]
+    for k in range(CHAIN_LENGTH):
+        angle = chains.angles[finger, k]
+        columns[k, 0] = columns[k, 1] = columns[k, 2] = 0.0
+        if angle >= 0 and angle_moves(skeleton.angle_bones, angle, bone):
+            x, y, z = _jacobian_column(
+                axes[angle],
+                positions[skeleton.angle_bones[angle]],
+                positions[tip, 0],
+                positions[tip, 1],
+                positions[tip, 2],
+            )
+            columns[k, 0], columns[k, 1], columns[k, 2] = x, y, z
+    for a in range(CHAIN_LENGTH):
+        for i in range(3):
+            slope[a] += weight * columns[a, i] * apart[i]
+        for b in range(a + 1):
+            for i in range(3):
+                normal[a, b] += weight * columns[a, i] * columns[b, i]
 
 
 @inner
@@ -159,12 +210,15 @@ def solve_least_squares(
     confidence: float,
     limits: Array,
     surface: Surface,
+    weights: Array,
+    anchors: Array,
     angles: Array,
 ):
     """From a first guess in `angles (A,)` to better ones there, inside `limits (A, 2)`.
 
     They stay near the angles `predicted (A,)`, bring joints to `targets (J, 3)`, keep fingers out of the object and
-    pull them onto it where the predicted `distances (J,)` or the `confidence` in a grasp say so.
+    pull them onto it where the predicted `distances (J,)` or the `confidence` in a grasp say so. `weights (F,)` and
+    `anchors (F, 4)`, flat, are those of a `Grip`.
     """
     positions, rotations, axes = _positions(), _rotations(), _axes()
     normal, slope, confidences = _square(), _row(), _confidences()
@@ -176,9 +230,13 @@ def solve_least_squares(
             normal[:] = 0.0
             for k in range(CHAIN_LENGTH):
                 angle = chains.angles[finger, k]
-                normal[k, k] = STAY_WEIGHT_M2 + 1e-9
-                slope[k] = STAY_WEIGHT_M2 * (predicted[angle] - angles[angle]) if angle >= 0 else 0.0
-            _add_targets(skeleton, chains, finger, positions, axes, targets, normal, slope)
+                stay = STAY_WEIGHT_M2 + weights[finger] * GRIP_WEIGHT_M2
+                normal[k, k] = stay + 1e-9
+                slope[k] = stay * (predicted[angle] - angles[angle]) if angle >= 0 else 0.0
+            _add_targets(skeleton, chains, finger, positions, axes, targets, 1.0 - weights[finger], normal, slope)
+            anchor = anchors[ANCHOR * finger : ANCHOR * (finger + 1)]
+            if anchor[0] > 0.0:
+                _add_anchor(skeleton, chains, finger, positions, axes, anchor, surface, normal, slope)
             _add_surface(
                 skeleton,
                 chains,
@@ -186,7 +244,7 @@ def solve_least_squares(
                 positions,
                 axes,
                 distances,
-                confidences[finger],
+                max(confidences[finger], weights[finger]),
                 surface,
                 normal,
                 slope,

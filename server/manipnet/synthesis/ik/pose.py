@@ -17,6 +17,8 @@ from manipnet.synthesis.hand.hand import MAX_ANGLES, Hand, Indices, Skeleton
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.hand.packed import unpack_chains, unpack_skeleton
 from manipnet.synthesis.ik.correction import Problem, correct_nothing
+from manipnet.synthesis.ik.grip import grip_size, unpack_grip
+from manipnet.synthesis.ik.holding import Hands, leave_grips
 from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.decode import decode_into, unpack_output_columns
 from manipnet.synthesis.model.features import Windows
@@ -25,10 +27,11 @@ from manipnet.synthesis.objects.shape import Solid
 
 FEEDBACK_SHARE = 0.5
 """Share of its corrections that the network sees of its own hand: with all of them it strays from the poses it has
-learned, with none it does not know what it holds (docs/results.md, Ideas tried)."""
+learned, with none it does not know what it holds (docs/tried.md)."""
 
 _axes, _angles = stack_array(MAX_ANGLES, 3), stack_array(MAX_ANGLES)
 _correct: Callable[..., Any] = correct_nothing
+_improve: Callable[..., Any] = leave_grips
 
 
 class Poses(NamedTuple):
@@ -50,6 +53,10 @@ class Poses(NamedTuple):
     """`(N, A)` the hand as the network is to see it at the next tick, with `FEEDBACK_SHARE` of the correction."""
     feedback_positions: Array
     feedback_rotations: Array
+    grip: Array
+    """`(N, G)` what the hands remember of their grips; before a tick, as the last tick left it."""
+    predicted: Array
+    """`(N, A)` the network's own angles."""
 
 
 def allocate_poses(hand: Hand, count: int) -> Poses:
@@ -65,6 +72,8 @@ def allocate_poses(hand: Hand, count: int) -> Poses:
         np.empty((count, angles)),
         np.empty((count, joints, 3)),
         np.empty((count, bones, 3, 3)),
+        np.zeros((count, grip_size(len(hand.fingers), angles))),
+        np.empty((count, angles)),
     )
 
 
@@ -112,8 +121,9 @@ def _pose(
     """Pose hands `first … last - 1`, all about `solid`, from the network's `outputs (N, output_size)` and the angles
     `before (N, A)` of the last tick."""
     skeleton, chains, columns = unpack_skeleton(hand), unpack_chains(hand), unpack_output_columns(starts)
-    axes, predicted = _axes(), _angles()
+    axes = _axes()
     for n in range(first, last):
+        predicted = poses.predicted[n]
         _predict(skeleton, columns, outputs[n], before[n], response, limits, axes, n, poses, predicted)
         problem = Problem(
             skeleton,
@@ -128,18 +138,21 @@ def _pose(
             predicted,
             poses.raw_positions[n],
             poses.distances[n],
+            unpack_grip(poses.grip[n], len(chains.angles)),
         )
         _correct(problem, poses.angles[n], poses.correction[n])
         _settle(skeleton, predicted, axes, n, poses)
+    posed = poses.predicted, poses.angles, poses.distances, poses.grip
+    _improve(Hands(skeleton, chains, limits, solid, windows, first, last, *posed))
 
 
-def make_pose_kernel(correct: Callable[..., Any], name: str) -> Callable[..., None]:
+def make_pose_kernel(correct: Callable[..., Any], improve: Callable[..., Any], name: str) -> Callable[..., None]:
     """`_pose` compiled with the step `correct`, under a name of its own in the cache on disk.
 
     The step is a global of the compiled function, because Numba cannot find a closure over a compiled function again:
     it files one by a number that is new in every process.
     """
-    function = FunctionType(_pose.__code__, {**globals(), "_correct": correct}, name)
+    function = FunctionType(_pose.__code__, {**globals(), "_correct": correct, "_improve": improve}, name)
     function.__qualname__, function.__module__ = name, __name__
     return kernel(function)
 
@@ -147,5 +160,10 @@ def make_pose_kernel(correct: Callable[..., Any], name: str) -> Callable[..., No
 @cache
 def pose_kernel(solver: str) -> Callable[..., None]:
     """The kernel of a solver in `solvers.SOLVERS`, compiled when it is first called. Raises `UnknownSolverError`."""
-    module, _, function = solver_named(solver).correct.partition(":")
-    return make_pose_kernel(getattr(import_module(module), function), f"pose_by_{solver}")
+    solver_ = solver_named(solver)
+    return make_pose_kernel(_function(solver_.correct), _function(solver_.improve), f"pose_by_{solver}")
+
+
+def _function(place: str) -> Callable[..., Any]:
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)

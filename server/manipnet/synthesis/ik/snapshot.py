@@ -1,4 +1,4 @@
-"""What one hand senses and aims for at one instant, for whoever wants to look at it (the live page)."""
+"""What one hand senses and aims for at one instant, for display on the live page."""
 
 from typing import NamedTuple
 

@@ -17,6 +17,8 @@ class Solver:
     """One line for a person who chooses."""
     correct: str
     """`module:function` of its compiled step; `correction` describes the arguments."""
+    improve: str = "manipnet.synthesis.ik.holding:leave_grips"
+    """`module:function` that looks after the grips of all hands when they are posed."""
 
 
 _CORRECTION: Final = "manipnet.synthesis.ik.correction"
@@ -27,6 +29,12 @@ SOLVERS: Final = {
             "least_squares",
             "damped least squares on joints and surfaces",
             f"{_CORRECTION}:correct_by_least_squares",
+        ),
+        Solver(
+            "wrench",
+            "least squares, and contacts that can carry what is held",
+            f"{_CORRECTION}:correct_by_wrench",
+            "manipnet.synthesis.ik.holding:improve_grips",
         ),
         Solver("ccd", "the paper's cyclic coordinate descent", f"{_CORRECTION}:correct_by_ccd"),
         Solver("none", "no correction", f"{_CORRECTION}:correct_nothing"),

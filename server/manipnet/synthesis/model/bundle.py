@@ -7,30 +7,28 @@ hand, `CARD.md` is for people.
 import hashlib
 import json
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import onnxruntime
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.hand.hand_file import HAND_FILE, read_hand
+from manipnet.synthesis.hand.hand_file import HAND_FILE, read_hand, write_hand
 from manipnet.synthesis.hand.validation import HandError
 from manipnet.synthesis.model.layout import Layout, layout_of
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, Provider
-from manipnet.synthesis.model.shipped import models_folder, shipped_models
+from manipnet.synthesis.model.shipped import BundleError, find_bundle
 from manipnet.wire.hand_names import misfit
 
 FORMAT = 2
-
+NETWORK_FILE: Final = "manipnet.onnx"
+META_FILE: Final = "bundle.json"
 _CPU, _CUDA = "CPUExecutionProvider", "CUDAExecutionProvider"
 _log = logging.getLogger(__name__)
-
-
-class BundleError(ValueError):
-    """A bundle that cannot be used; the text names the file, what is wrong and what is expected."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +49,7 @@ class Bundle:
     meta: dict[str, Any]
     """The content of `bundle.json`."""
     model_hash: str
+    """SHA-256 of all that the synthesis depends on: network, hand, and `bundle.json` with its pose and limits."""
     session: onnxruntime.InferenceSession
     folder: Path
 
@@ -69,28 +68,42 @@ def load_bundle(model: Path | str = DEFAULT_MODEL, provider: Provider = "cpu") -
 
     If a GPU was requested and cannot be used, a line of the log says why and the network runs on the processor.
     """
-    folder = _find(model)
+    folder = find_bundle(model)
     hand = _read_hand(folder / HAND_FILE)
     layout = layout_of(hand)
-    meta = _read_meta(folder / "bundle.json", hand, layout)
-    path = folder / "manipnet.onnx"
+    meta = _read_meta(folder / META_FILE, hand, layout)
+    path = folder / NETWORK_FILE
     try:
         content = path.read_bytes()
     except OSError as error:
         raise BundleError(f"{path}: cannot be read ({error.strerror})") from None
-    model_hash = hashlib.sha256(content).hexdigest()
-    if meta.get("model_sha256") != model_hash:
+    if meta.get("model_sha256") != hashlib.sha256(content).hexdigest():
         raise BundleError(f"{path}: its hash is not the one in bundle.json; the bundle is damaged, copy it again")
     session = open_session(path, content, layout, provider)
-    return Bundle(folder.name, hand, layout, *_read_pose(folder, meta, hand), meta, model_hash, session, folder)
+    pose = _read_pose(folder / META_FILE, meta, hand)
+    return Bundle(folder.name, hand, layout, *pose, meta, _hash_of(folder), session, folder)
 
 
-def _find(model: Path | str) -> Path:
-    folder = Path(model) if Path(model).is_dir() else models_folder() / str(model)
-    if not folder.is_dir():
-        shipped = ", ".join(shipped_models())
-        raise BundleError(f"model {str(model)!r} is neither a folder nor a shipped bundle; shipped are {shipped}")
-    return folder
+def write_bundle(folder: Path, network: bytes, hand: Hand, meta: Mapping[str, Any]) -> None:
+    """Write a bundle that `load_bundle` accepts: an ONNX graph, its hand, and the rest of `bundle.json` as `meta`.
+
+    `meta` needs `rest_angles_rad`, `limits_rad` and `response`; everything else in it is kept. Raises `OSError`.
+    """
+    described = {
+        "format": FORMAT,
+        "layout": layout_of(hand).describe(),
+        "angle_names": list(hand.angle_names),
+        "model_sha256": hashlib.sha256(network).hexdigest(),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / NETWORK_FILE).write_bytes(network)
+    write_hand(hand, folder / HAND_FILE)
+    (folder / META_FILE).write_text(json.dumps({**meta, **described}, indent=1) + "\n", encoding="utf-8")
+
+
+def _hash_of(folder: Path) -> str:
+    digests = [hashlib.sha256((folder / name).read_bytes()).digest() for name in (NETWORK_FILE, HAND_FILE, META_FILE)]
+    return hashlib.sha256(b"".join(digests)).hexdigest()
 
 
 def open_session(
@@ -110,7 +123,7 @@ def open_session(
     sizes = [node.shape[-1] for node in (*session.get_inputs(), *session.get_outputs())]
     expected = [layout.input_size, layout.output_size]
     if sizes != expected:
-        raise BundleError(f"{path}: takes and gives {sizes} numbers; expected are {expected}")
+        raise BundleError(f"{path}: has {sizes} inputs and outputs; expected are {expected}")
     return session
 
 
@@ -153,8 +166,8 @@ def _read_meta(path: Path, hand: Hand, layout: Layout) -> dict[str, Any]:
     return meta
 
 
-def _read_pose(folder: Path, meta: dict[str, Any], hand: Hand) -> tuple[Array, Array, float]:
-    path, count = folder / "bundle.json", hand.angle_count
+def _read_pose(path: Path, meta: dict[str, Any], hand: Hand) -> tuple[Array, Array, float]:
+    count = hand.angle_count
     try:
         rest = np.array(meta["rest_angles_rad"], dtype=np.float64)
         limits = np.array(meta["limits_rad"], dtype=np.float64)

@@ -1,10 +1,19 @@
-"""The bundles that come with this version: where they are, and their hand for whoever needs one without a model."""
+"""Where bundles are, and the hand of the shipped ones for code that needs one without a model.
+
+Finding a bundle imports neither NumPy nor ONNX Runtime, so that a command can name a wrong one at once.
+"""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.hand.hand_file import HAND_FILE, read_hand
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
+
+if TYPE_CHECKING:
+    from manipnet.synthesis.hand.hand import Hand
+
+
+class BundleError(ValueError):
+    """A bundle that cannot be used; the text names the file, what is wrong and what is expected."""
 
 
 def models_folder() -> Path:
@@ -19,6 +28,17 @@ def shipped_models() -> list[str]:
     return sorted(path.name for path in models_folder().glob("*") if (path / "bundle.json").is_file())
 
 
-def shipped_hand(model: str = DEFAULT_MODEL) -> Hand:
+def find_bundle(model: Path | str) -> Path:
+    """The folder of a bundle, which is given by its folder or by the name of a shipped one. Raises `BundleError`."""
+    folder = Path(model) if Path(model).is_dir() else models_folder() / str(model)
+    if not folder.is_dir():
+        shipped = ", ".join(shipped_models())
+        raise BundleError(f"model {str(model)!r} is neither a folder nor a shipped bundle; shipped are {shipped}")
+    return folder
+
+
+def shipped_hand(model: str = DEFAULT_MODEL) -> "Hand":
     """The hand of a shipped bundle. Raises `HandError`."""
+    from manipnet.synthesis.hand.hand_file import HAND_FILE, read_hand
+
     return read_hand(models_folder() / model / HAND_FILE)

@@ -9,7 +9,11 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from manipnet.synthesis.objects.foreign import foreign_format
+from manipnet.synthesis.objects.glb import read_glb
+from manipnet.synthesis.objects.glb_accessors import GlbError
 from manipnet.synthesis.objects.repair import (
+    agree,
     drop_debris,
     fill_small_holes,
     is_closed,
@@ -18,7 +22,7 @@ from manipnet.synthesis.objects.repair import (
     signed_volume,
     weld,
 )
-from manipnet.synthesis.objects.units import UNITS_M
+from manipnet.synthesis.objects.units import UNITS_M, plausible_units
 
 FORMATS: Final = (".obj", ".ply", ".stl", ".glb")
 MAX_FACES: Final = 300_000
@@ -64,23 +68,27 @@ def closed_mesh(vertices: NDArray, faces: NDArray, name: str) -> ClosedMesh:
     """Check and repair a triangle mesh in metres. Raises `MeshError` if it cannot be closed.
 
     Repairs do not change the shape: vertices at the same place are merged, repeated faces and debris are dropped, small
-    holes are closed, and faces are turned outward. A mesh that is already closed keeps its arrays.
+    holes are closed, and each shell is turned outward, or inward if it is the wall of a cavity. A mesh that needs none
+    of this keeps its arrays.
     """
     vertices, faces = np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int32)
     _check_arrays(vertices, faces)
     _check_size(vertices[np.unique(faces)])
     if not is_closed(faces):
         vertices, faces = weld(vertices, faces)
-    faces = orient(vertices, faces)
     if not is_closed(faces):
-        vertices, faces = fill_small_holes(vertices, faces)
-        vertices, faces = drop_debris(vertices, orient(vertices, faces))
+        vertices, faces = fill_small_holes(vertices, agree(faces))
+        vertices, faces = drop_debris(vertices, agree(faces))
+    if is_closed(faces):
+        faces = orient(vertices, faces)
     _check_closed(vertices, faces)
     digest = hashlib.sha256(vertices.astype("<f8").tobytes() + faces.astype("<i4").tobytes()).hexdigest()
     return ClosedMesh(name, vertices, faces, digest)
 
 
 def _read(path: Path) -> tuple[NDArray, NDArray]:
+    if (reason := foreign_format(path)) is not None:
+        raise MeshError(reason)
     if path.suffix.lower() not in FORMATS:
         raise MeshError(f"the format {path.suffix!r} is unknown; allowed are {', '.join(FORMATS)}")
     if not path.is_file():
@@ -88,17 +96,25 @@ def _read(path: Path) -> tuple[NDArray, NDArray]:
     if path.stat().st_size > MAX_FILE_BYTES:
         raise MeshError(f"the file is larger than {MAX_FILE_BYTES // 1_000_000} MB; reduce the mesh first")
     try:
-        mesh = trimesh.load_mesh(path, process=False, **({"skip_materials": True} if _is_obj(path) else {}))
+        return _arrays(path)
+    except GlbError as error:
+        raise MeshError(str(error)) from None
+    except MeshError:
+        raise
     except Exception as error:  # readers of foreign formats raise exceptions of any kind
         reason = f"{type(error).__name__}: {error}"
         raise MeshError(f"cannot be read as {path.suffix[1:].upper()} ({reason}); export it again") from None
+
+
+def _arrays(path: Path) -> tuple[NDArray, NDArray]:
+    """Vertices and triangles as they are in the file."""
+    if path.suffix.lower() == ".glb":
+        return read_glb(path.read_bytes())
+    options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
+    mesh = trimesh.load_mesh(path, process=False, **options)
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise MeshError("holds no triangles; export the surface, not points, curves or an empty scene")
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
-
-
-def _is_obj(path: Path) -> bool:
-    return path.suffix.lower() == ".obj"
 
 
 def _check_arrays(vertices: NDArray, faces: NDArray) -> None:
@@ -120,8 +136,10 @@ def _check_size(vertices: NDArray) -> None:
     size = float(np.ptp(vertices, axis=0).max())
     if smallest <= size <= largest:
         return
-    hint = next((unit for unit, metre in UNITS_M.items() if 0.03 <= size * metre <= 0.6), None)
-    remedy = f'set unit = "{hint}" if the file is in {hint}' if hint else "set its unit or scale"
+    if size == 0.0:
+        raise MeshError("has all its vertices at one place; export the surface again")
+    fitting = plausible_units(size)
+    remedy = f"if the file is in {' or '.join(fitting)}, set its unit" if fitting else "set its unit or scale"
     raise MeshError(f"is {size:.3g} m across; allowed are {smallest} to {largest} m; {remedy}")
 
 

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from manipnet.synthesis.objects.shells import nesting_depths
+
 Vertices = NDArray[np.float64]
 Faces = NDArray[np.int32]
 
@@ -65,17 +67,24 @@ def compact(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:
     return vertices[used], to.reshape(-1, 3).astype(np.int32)
 
 
-def orient(vertices: Vertices, faces: Faces) -> Faces:
-    """Turn faces so that neighbours agree and the mesh encloses a positive volume.
+def agree(faces: Faces) -> Faces:
+    """Turn faces so that neighbours agree, which leaves open whether they face outward."""
+    return faces if is_consistent(faces) else _agree(faces)
 
-    A mesh that is already consistent is turned as a whole, so that inner walls keep facing the cavity.
+
+def orient(vertices: Vertices, faces: Faces) -> Faces:
+    """Turn the shells of a closed mesh: outward, but those of cavities inward, and solids in cavities outward again.
+
+    A shell that lies inside an odd number of others is a cavity. Faces that are right already stay as they are.
     """
-    if not is_consistent(faces):
-        faces = _agree(faces)
-        _, part = connected_components(_adjacency(faces)[0], directed=False)
-        volume = np.bincount(part, weights=_face_volumes(vertices, faces))
-        return np.where((volume < 0.0)[part][:, None], faces[:, ::-1], faces).astype(np.int32)
-    return faces[:, ::-1].copy() if signed_volume(vertices, faces) < 0.0 else faces
+    faces = agree(faces)
+    count, part = connected_components(_adjacency(faces)[0], directed=False)
+    volumes = np.bincount(part, weights=_face_volumes(vertices, faces))
+    wanted = np.ones(count)
+    if count > 1:
+        wanted[nesting_depths(vertices, faces, part) % 2 == 1] = -1.0
+    wrong = volumes * wanted < 0.0
+    return np.where(wrong[part][:, None], faces[:, ::-1], faces).astype(np.int32) if wrong.any() else faces
 
 
 def drop_debris(vertices: Vertices, faces: Faces) -> tuple[Vertices, Faces]:

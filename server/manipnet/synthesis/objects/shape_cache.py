@@ -48,7 +48,7 @@ def write_cached(path: Path, bvh: Bvh, field: Field) -> None:
 def _remove_oldest(folder: Path) -> None:
     """Delete the files that were used longest ago, as far as the folder is too large."""
     files: list[tuple[float, int, Path]] = []
-    for path in folder.glob("*.npz"):
+    for path in folder.glob("*.npz*"):  # also what a process that was killed has written in part
         with suppress(OSError):  # another process has just deleted it
             stat = path.stat()
             files.append((stat.st_mtime, stat.st_size, path))

@@ -77,7 +77,7 @@ namespace ManipNet.Client
         }
 
         /// <summary>
-        /// Begins anew, for a new session or after the sender's clock went back, as when a take loops.
+        /// Starts again, for a new session or after the sender's clock went back, as when a take loops.
         /// </summary>
         void Restart(HandsFrame frame)
         {

@@ -68,7 +68,7 @@ bool Interpolator::Accept(const HandsFrame& frame, double arrival) {
     return true;
 }
 
-/// Begins anew, for a new session or after the sender's clock went back, as when a take loops.
+/// Starts again, for a new session or after the sender's clock went back, as when a take loops.
 void Interpolator::Restart(const HandsFrame& frame) {
     Recent.Clear();
     Clock.Reset();

@@ -1,4 +1,4 @@
-"""What is fuzzed: for each input a reader, the one error it may raise, and good inputs to damage."""
+"""The readers that are fuzzed, each with the only error that it may raise and with good inputs to damage."""
 
 import json
 from collections.abc import Callable
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any
 
-import fuzz_paths  # noqa: F401 (must come before the writers)
 import msgpack
 import natnet_writer as natnet
 from fuzz_damage import damaged, reshaped
 from fuzz_files import ACTORS, RIG, bundles, place_recording, place_rig, read_recording, recordings, toml
+from fuzz_takes import FILE_TARGETS
 from osc_writer import bundle, osc
 
 from manipnet.common.options import ConfigError
@@ -21,7 +21,8 @@ from manipnet.inputs.natnet.protocol import read_echo, read_packet, read_server_
 from manipnet.inputs.osc.assembler import FrameAssembler
 from manipnet.inputs.osc.packet import split_packet
 from manipnet.recording.mcap_file import RecordingError
-from manipnet.synthesis.model.bundle import BundleError, load_bundle
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import BundleError
 from manipnet.wire.bodies import MessageError, parse_bodies
 
 VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5)]
@@ -29,9 +30,10 @@ VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5)]
 
 @dataclass(frozen=True)
 class Target:
-    """`read` takes what `place` makes of the bytes, itself or a path, and raises nothing but `error`.
+    """A reader: `read` takes what `place` makes of an input, the bytes themselves or a path, and raises only `error`.
 
-    `good[0]` is read after damaged inputs. `documents` are written by `dump` after odd things were put into them.
+    `good[0]` is read after damaged inputs. `documents` are good documents, which `dump` writes as bytes after some of
+    their values were replaced.
     """
 
     read: Callable[[Any], object]
@@ -42,7 +44,7 @@ class Target:
     place: Callable[[bytes], Any] = lambda data: data
 
     def case(self, rng: Random) -> bytes:
-        """An input to read, most probably a bad one."""
+        """The next input, which is most probably damaged."""
         if self.documents and rng.random() < 0.5:
             return self.dump(reshaped(rng, rng.choice(self.documents)))
         return damaged(rng, self.good)
@@ -67,7 +69,7 @@ def _osc(data: bytes) -> object:
 
 
 def _natnet(data: bytes) -> object:
-    """The version of the frame is in its first byte, as the client knows it from elsewhere."""
+    """Read a packet. The first byte selects the version of the protocol, which a client learns from the server."""
     version = VERSIONS[data[0] % len(VERSIONS)] if data else VERSIONS[0]
     message_id, payload = read_packet(data[1:])
     match message_id:
@@ -117,6 +119,7 @@ TARGETS = {
     "rig": Target(load_rig, [toml(RIG), toml(ACTORS)], ConfigError, (RIG, ACTORS), toml, place_rig),
     "recording": Target(read_recording, recordings(), RecordingError, place=place_recording),
 }
+TARGETS |= {name: Target(file.read, file.good, file.error, place=file.place) for name, file in FILE_TARGETS.items()}
 if _BUNDLES is not None:
     _META, _DOCUMENTS = _BUNDLES.meta, (json.loads(_BUNDLES.meta),)
     TARGETS |= {

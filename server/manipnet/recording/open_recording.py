@@ -31,11 +31,11 @@ Meshes = Mapping[str, tuple[Array, Any, float]]
 _log = logging.getLogger(__name__)
 
 
-class TakeError(RuntimeError):
+class RecordingFailedError(RuntimeError):
     """A recording could not be written; the text says why."""
 
 
-class Take:
+class OpenRecording:
     """Records hands messages from its construction to `finish`."""
 
     def __init__(self, path: Path, metadata: Mapping[str, str], meshes: Meshes, telemetry: Telemetry) -> None:
@@ -66,15 +66,15 @@ class Take:
     def finish(self) -> dict[str, int]:
         """Write what waits and close the file; returns the numbers of `hands` and `bodies` in it.
 
-        Raises `TakeError`.
+        Raises `RecordingFailedError`.
         """
         self._finishing.set()
         self._thread.join(STOP_S)
         if self.is_broken:
-            raise TakeError(self.problem)
+            raise RecordingFailedError(self.problem)
         answer = self._answer()
         if "error" in answer:
-            raise TakeError(f"{self.path.name}: {answer['error']}")
+            raise RecordingFailedError(f"{self.path.name}: {answer['error']}")
         return answer
 
     def _answer(self) -> dict[str, Any]:
@@ -95,7 +95,7 @@ class Take:
             reason = self._answer().get("error", "its process has ended")
             self.problem = (
                 f"{self.path.name} has ended early ({reason}); what was written until then is kept, and "
-                f"`manipnet recover {self.path}` makes a whole recording of it"
+                f"`manipnet recover {self.path}` repairs it"
             )
             self.is_broken = True
             _log.error("the recording %s; the session goes on", self.problem)

@@ -1,0 +1,25 @@
+"""Checks that files exist. They need no library, so that a mistyped path is reported before anything loads."""
+
+from pathlib import Path
+
+from manipnet.common.options import ConfigError
+from manipnet.config.settings import ServerConfig
+from manipnet.synthesis.model.shipped import find_bundle
+
+
+def check_files(config: ServerConfig) -> None:
+    """Raise `ConfigError` unless the meshes can be opened, and `BundleError` unless the model exists."""
+    find_bundle(config.model)
+    for actor in config.actors:
+        for prop in actor.objects:
+            require_file(prop.mesh)
+
+
+def require_file(path: Path | None) -> None:
+    """Raise `ConfigError` unless the file can be opened. None stands for an option that was not given."""
+    if path is None:
+        return
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror or error})") from None

@@ -1,0 +1,238 @@
+"""Reads the triangles of a glTF Binary file: all meshes of its scene as they are placed there, in metres.
+
+Only what shapes the surface is read: nodes, instances, triangles in all their encodings, morph weights and skins in the
+pose of the file. Materials, lights, cameras and animations are not. A file may require extensions of its readers; one
+that changes the surface and is not read here is named in the error. Source: the glTF 2.0 specification.
+"""
+
+import json
+import struct
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manipnet.synthesis.objects.glb_accessors import Accessors, GlbError, check_size
+from manipnet.synthesis.objects.glb_draco import DRACO, decode_draco
+
+READ: Final = {
+    DRACO,
+    "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
+    "KHR_node_visibility",
+}
+MESHOPT: Final = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+APPEARANCE: Final = (
+    *("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "EXT_lights_", "MSFT_lod"),
+    *("KHR_xmp", "KHR_animation", "KHR_audio", "ADOBE_materials_", "EXT_materials_", "VRMC_", "EXT_lights"),
+)
+"""Extensions that begin so leave the surface as it is."""
+MAX_INSTANCES: Final = 10_000
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+
+
+def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices `(V, 3)` in metres and triangles `(F, 3)`. Raises `GlbError`."""
+    document, binary = _chunks(data)
+    try:
+        _check_extensions(document)
+        with np.errstate(all="ignore"):  # numbers that are not finite are refused when the mesh is checked
+            return _Scene(document, binary).triangles()
+    except GlbError:
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+        raise GlbError(f"is a damaged glTF file ({type(error).__name__}: {error}); export it again") from None
+
+
+def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """The JSON document and the binary chunk."""
+    if data[:4] != b"glTF":
+        hint = "; it is a .gltf file: export it as glTF Binary (.glb)" if data.lstrip()[:1] == b"{" else ""
+        raise GlbError(f"is not a glTF Binary file: it does not begin with glTF{hint or '; export it again'}")
+    try:
+        version, length = struct.unpack_from("<2I", data, 4)
+        if version != 2:
+            raise GlbError(f"is glTF {version}; only glTF 2 can be read, so export it again with a newer program")
+        at, chunks = 12, {}
+        while at + 8 <= min(length, len(data)):
+            size, kind = struct.unpack_from("<I4s", data, at)
+            if at + 8 + size > len(data):
+                raise GlbError("is cut off; copy or export it again")
+            chunks.setdefault(kind, data[at + 8 : at + 8 + size])
+            at += 8 + size
+        document = json.loads(chunks[b"JSON"])
+    except (struct.error, KeyError, ValueError, RecursionError) as error:
+        if isinstance(error, GlbError):
+            raise
+        raise GlbError(f"is a damaged glTF file ({error}); export it again") from None
+    if not isinstance(document, dict):
+        raise GlbError("is a damaged glTF file (its JSON is not an object); export it again")
+    return document, chunks.get(b"BIN\0", b"")
+
+
+def _check_extensions(document: dict[str, Any]) -> None:
+    """Raise `GlbError` for an extension that the file requires and that is not read."""
+    required = document.get("extensionsRequired", [])
+    if compressed := [name for name in required if name in MESHOPT]:
+        raise GlbError(f"is compressed with {compressed[0]}, which cannot be read; export it without compression")
+    if unknown := [name for name in required if name not in READ and not str(name).startswith(APPEARANCE)]:
+        raise GlbError(f"requires the extension {unknown[0]}, which cannot be read; export it without this extension")
+
+
+class _Scene:
+    """The nodes of a document."""
+
+    def __init__(self, document: dict[str, Any], binary: bytes) -> None:
+        self._document, self._accessors = document, Accessors(document, binary)
+        self._nodes: list[dict[str, Any]] = document.get("nodes", [])
+        self._parents = {child: n for n, node in enumerate(self._nodes) for child in node.get("children", [])}
+        self._required = set(document.get("extensionsRequired", []))
+
+    def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The triangles of all nodes of the scene, in the world."""
+        vertices, faces, total = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
+        for node in self._visible():
+            if "mesh" not in self._nodes[node]:
+                continue
+            for matrix, points, corners in self._placed(node):
+                check_size(total + len(points))
+                placed = points @ matrix[:3, :3].T + matrix[:3, 3]
+                mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
+                faces.append(total + (corners[:, ::-1] if mirrored else corners))
+                vertices.append(placed)
+                total += len(points)
+        if sum(map(len, faces)) == 0:
+            raise GlbError("holds no triangles; export the surface, not points, curves or an empty scene")
+        return np.concatenate(vertices), np.concatenate(faces)
+
+    def _visible(self) -> list[int]:
+        """The nodes of the scene in order, without those that are hidden."""
+        scenes = self._document.get("scenes", [])
+        roots = [n for n in range(len(self._nodes)) if n not in self._parents]
+        waiting = list(scenes[self._document.get("scene", 0)].get("nodes", []) if scenes else roots)[::-1]
+        order: list[int] = []
+        seen: set[int] = set()
+        while waiting:
+            node = waiting.pop()
+            if node in seen:
+                raise GlbError(f"is a damaged glTF file (node {node} is in it twice); export it again")
+            seen.add(node)
+            if _extension(self._nodes[node], "KHR_node_visibility").get("visible", True):
+                order.append(node)
+                waiting += self._nodes[node].get("children", [])[::-1]
+        return order
+
+    def _placed(self, node: int) -> list[tuple[NDArray, NDArray, NDArray]]:
+        """Matrix, vertices and triangles of every primitive and instance of a node."""
+        mesh = self._document["meshes"][self._nodes[node]["mesh"]]
+        weights = self._nodes[node].get("weights", mesh.get("weights", []))
+        parts = [
+            part for primitive in mesh["primitives"] if (part := self._primitive(node, primitive, weights)) is not None
+        ]
+        if "skin" in self._nodes[node]:  # its joints place it, whatever the node's own transform is
+            return [(np.eye(4), *part) for part in parts]
+        return [(matrix, *part) for matrix in self._instances(node) for part in parts]
+
+    def _primitive(self, node: int, primitive: dict[str, Any], weights: list[float]) -> tuple[NDArray, NDArray] | None:
+        """Vertices and triangles; None for points and lines."""
+        mode = primitive.get("mode", _TRIANGLES)
+        if mode not in (_TRIANGLES, _STRIP, _FAN):
+            return None
+        position = primitive["attributes"]["POSITION"]
+        compressed = _extension(primitive, DRACO)
+        if compressed and (DRACO in self._required or not self._accessors.has_data(position)):
+            points, corners = decode_draco(self._accessors.view(compressed["bufferView"]))
+        else:
+            points = self._accessors.read(position, 3)
+            indices = primitive.get("indices")
+            loose = (
+                np.arange(len(points)) if indices is None else self._accessors.read(indices, 1)[:, 0].astype(np.int64)
+            )
+            corners = _corners(loose, mode)
+        if len(corners) and not 0 <= corners.min() <= corners.max() < len(points):
+            raise GlbError(f"has a triangle with vertex {corners.max()} of {len(points)}; export it again")
+        for target, weight in zip(primitive.get("targets", []), weights, strict=False):
+            if weight and "POSITION" in target:
+                points = points + float(weight) * self._accessors.read(target["POSITION"], 3)
+        skin = self._nodes[node].get("skin")
+        return (points if skin is None else self._skinned(points, primitive["attributes"], skin)), corners
+
+    def _instances(self, node: int) -> list[NDArray]:
+        """The world matrices of a node's copies."""
+        world = self._world(node)
+        attributes = _extension(self._nodes[node], "EXT_mesh_gpu_instancing").get("attributes")
+        if not attributes:
+            return [world]
+        parts = {
+            name: self._accessors.read(i, 4 if name == "ROTATION" else 3)
+            for name, i in attributes.items()
+            if name in ("TRANSLATION", "ROTATION", "SCALE")
+        }
+        count = min(map(len, parts.values()), default=1)
+        if count > MAX_INSTANCES:
+            raise GlbError(f"has {count} copies of one mesh; at most {MAX_INSTANCES} are allowed")
+        return [world @ _matrix(**{name.lower(): values[i] for name, values in parts.items()}) for i in range(count)]
+
+    def _world(self, node: int) -> NDArray:
+        """The matrix from a node to the scene."""
+        matrix, passed = np.eye(4), 0
+        at: int | None = node
+        while at is not None:
+            own = self._nodes[at]
+            local = (
+                np.array(own["matrix"], dtype=np.float64).reshape(4, 4).T
+                if "matrix" in own
+                else _matrix(**{part: own[part] for part in ("translation", "rotation", "scale") if part in own})
+            )
+            matrix, at, passed = local @ matrix, self._parents.get(at), passed + 1
+            if passed > len(self._nodes):
+                raise GlbError("is a damaged glTF file (its nodes contain each other); export it again")
+        return matrix
+
+    def _skinned(self, points: NDArray, attributes: dict[str, int], skin: int) -> NDArray:
+        """Vertices as the joints of a skin place them in the pose of the file."""
+        joints = self._document["skins"][skin]["joints"]
+        matrices = np.stack([self._world(joint) for joint in joints])
+        if (inverse := self._document["skins"][skin].get("inverseBindMatrices")) is not None:
+            matrices = matrices @ self._accessors.read(inverse, 16)[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+        ones = np.concatenate([points, np.ones((len(points), 1))], axis=1)
+        placed, total = np.zeros((len(points), 4)), np.zeros((len(points), 1))
+        for n in range(4):
+            if f"JOINTS_{n}" not in attributes:
+                break
+            owners = self._accessors.read(attributes[f"JOINTS_{n}"], 4).astype(np.int64)
+            shares = self._accessors.read(attributes[f"WEIGHTS_{n}"], 4)
+            for k in range(4):
+                placed += shares[:, k : k + 1] * np.einsum("nij,nj->ni", matrices[owners[:, k]], ones)
+                total += shares[:, k : k + 1]
+        return placed[:, :3] / np.where(total > 0.0, total, 1.0)
+
+
+def _corners(indices: NDArray, mode: int) -> NDArray:
+    """Triangles `(F, 3)` of a list, a strip or a fan of vertices."""
+    if mode == _TRIANGLES:
+        return indices[: len(indices) // 3 * 3].reshape(-1, 3)
+    count = max(len(indices) - 2, 0)
+    k = np.arange(count)
+    if mode == _FAN:
+        return np.stack([indices[k + 1], indices[k + 2], np.broadcast_to(indices[:1], count)], axis=1)
+    return np.stack([indices[k], indices[k + 1 + k % 2], indices[k + 2 - k % 2]], axis=1)
+
+
+def _matrix(translation: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1), scale: Any = (1, 1, 1)) -> NDArray:
+    x, y, z, w = np.asarray(rotation, dtype=np.float64) / max(float(np.linalg.norm(rotation)), 1e-12)
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn * np.asarray(scale, dtype=np.float64)
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def _extension(part: dict[str, Any], name: str) -> dict[str, Any]:
+    return part.get("extensions", {}).get(name, {})

@@ -1,0 +1,28 @@
+"""Damaged inputs for every reader: a few hundred in every run, and more with `--fuzz-seconds`."""
+
+import logging
+import math
+
+import pytest
+from fuzz_cases import fuzz, good_s
+from fuzz_readers import TARGETS
+
+CASES = 300
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_a_reader_raises_only_its_own_error(name, fuzz_seconds, fuzz_seed, report_line):
+    logging.disable()  # the warnings about damage, of which there are thousands
+    try:
+        tally = fuzz(name, CASES if fuzz_seconds is None else math.inf, fuzz_seed, fuzz_seconds or math.inf)
+    finally:
+        logging.disable(logging.NOTSET)
+    report_line(f"{name}: {tally}, the good input {1e3 * good_s(name):.3f} ms, seed {fuzz_seed}")
+    assert tally.cases >= CASES
+    assert tally.refused
+
+
+@pytest.mark.parametrize("name", TARGETS)
+def test_good_inputs_are_read(name):
+    for data in TARGETS[name].good:
+        TARGETS[name].read(TARGETS[name].place(data))

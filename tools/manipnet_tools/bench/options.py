@@ -1,0 +1,50 @@
+"""Options of `manipnet bench`, apart from its libraries so that `--help` is quick."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final, Literal, get_args
+
+from tyro.conf import UseAppendAction, arg
+
+from manipnet.common.options import ConfigError
+from manipnet.synthesis.model.providers import DEFAULT_MODEL, Provider
+from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.commands.checks import require_folder_of, require_meshes, require_take
+
+Section = Literal["tick", "models", "triangles", "actors", "straightforward", "start", "live", "minutes"]
+SECTIONS: Final[tuple[Section, ...]] = get_args(Section)
+USUAL: Final[tuple[Section, ...]] = tuple(name for name in SECTIONS if name != "minutes")
+"""The sections that are measured by default."""
+
+
+@dataclass(frozen=True)
+class BenchOptions:
+    """Measure how long each stage of a tick takes, beside a reference that is measured in the same run."""
+
+    take: Annotated[Path | None, arg(metavar="TAKE", help_behavior_hint="")] = None
+    """Measure on this take instead of the bundled demo."""
+    mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
+    """The mesh of the take's object NAME."""
+    model: Annotated[str, arg(metavar="NAME")] = DEFAULT_MODEL
+    """The model: the name of a shipped bundle, or a bundle's folder."""
+    beside: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
+    """Also time the ticks of this model."""
+    provider: Provider = "cpu"
+    """What the models run on."""
+    json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
+    """Also write all figures to this file."""
+    seconds: Annotated[float, arg(metavar="SECONDS")] = 100.0
+    """Total time of the timed parts. Building models and starting servers takes more."""
+    only: UseAppendAction[tuple[Section, ...]] = ()
+    """Measure only this section. By default all but `minutes`, which takes ten minutes."""
+
+    def check(self) -> None:
+        """Raise `ConfigError` or `BundleError` for values that cannot be used."""
+        if self.take is not None:
+            require_take(self.take)
+        elif self.mesh:
+            raise ConfigError(f"--mesh {self.mesh[0]}: is for a take; the demo has its own meshes, so give --take TAKE")
+        require_meshes(self.mesh)
+        for model in (self.model, *self.beside):
+            find_bundle(model)
+        require_folder_of(self.json, "--json")
