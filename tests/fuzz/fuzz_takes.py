@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import fuzz_paths  # noqa: F401 (must come before the writers)
 from fuzz_files import FOLDER
 from glb_writer import Glb, box, box_glb
 
