@@ -114,16 +114,29 @@ def test_pieces_cover_the_surface_and_leave_the_inside_open():
     assert max(np.ptp(piece, axis=0).max() for piece in pieces) < 0.025
 
 
-@pytest.mark.dataset
+def test_a_finger_that_enters_the_object_ends_there(test):
+    """The middle segment of the index finger pierces the cube; its last one is on the other side."""
+    joints = OPEN_HAND + AWAY
+    joints[6], joints[7], joints[18] = [-0.03, 0.0, 0.0], [0.03, 0.0, 0.0], [0.03, 0.03, 0.0]
+    (out,) = test._taken_out(metrics.capsule_axes(HAND, joints[None]))
+    assert HAND.capsules[out].tolist() == [[6, 7], [7, 18]]
+
+
 @pytest.mark.slow
-def test_captured_fingers_hold_the_mug_and_flat_ones_do_not(cases):
-    case = cases["mug1"]
+def test_captured_fingers_hold_and_hands_beside_the_object_or_in_it_do_not(cases):
+    case = cases["cyl_med3"]
     judge = drop_cells.DropCells(case, most=12)
-    flat = {side: np.broadcast_to(OPEN_HAND, p.shape) for side, p in case.captured.items()}
-    captured, dropped = judge.shares(case.captured), judge.shares(flat)
-    for cell in ("drop_right", "drop_left"):
-        assert captured[cell] >= 0.8
-        assert dropped[cell] <= 0.4
+    del judge.cells["drop_both"]
+    shares = {
+        toward_back_m: judge.shares(
+            {side: p + np.array([0.0, 0.0, toward_back_m]) for side, p in case.captured.items()}
+        )
+        for toward_back_m in (-0.04, 0.0, 0.04)
+    }
+    for cell in judge.cells:
+        assert shares[0.0][cell] >= 0.9
+        assert shares[0.04][cell] <= 0.2
+        assert shares[-0.04][cell] <= 0.4
 
 
 def test_cells_are_frames_in_which_these_hands_alone_touch_the_lifted_object(cases):

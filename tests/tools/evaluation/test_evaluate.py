@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from manipnet import geometry
+from manipnet.geometry import Array, Side
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -95,7 +96,8 @@ def test_the_key_of_a_sheet_says_which_picture_is_captured(results, tmp_path):
         assert pair is not None
         left = SIZE * (2 * k % 4 + (pair[2] == "right"))
         top = SIZE * (2 * k // 4)
-        side, tick = pair[3], int(pair[4])
+        side: Side = "left" if pair[3] == "left" else "right"
+        tick = int(pair[4])
         expected = grasp_picture(case, side, case.captured[side][tick], tick, mark=False)
         np.testing.assert_array_equal(sheet[top : top + SIZE, left : left + SIZE], expected)
 
@@ -110,15 +112,19 @@ def test_a_file_of_synthesize_is_a_row_like_any_other(results, tmp_path):
         for side, positions in case.captured.items()
     }
     path = tmp_path / "fingers.npz"
-    np.savez(path, time=case.ticks.time_s, **world)
+
+    def write(time_s: Array, arrays: dict[str, Array]) -> None:
+        np.savez(path, allow_pickle=False, time=time_s, **arrays)
+
+    write(case.ticks.time_s, world)
     for side, positions in read_fingers(path, case).items():
         np.testing.assert_allclose(positions, case.captured[side], atol=1e-12)
     later = case[: len(case) // 2]
     assert len(read_fingers(path, later)["left"]) == len(later)
-    np.savez(path, time=case.ticks.time_s[:-5], **{name: p[:-5] for name, p in world.items()})
+    write(case.ticks.time_s[:-5], {name: p[:-5] for name, p in world.items()})
     with pytest.raises(DataError, match=r"fingers.npz: holds .* s; mug1 is judged from"):
         read_fingers(path, case)
-    np.savez(path, time=case.ticks.time_s)
+    write(case.ticks.time_s, {})
     with pytest.raises(DataError, match="is not a file of manipnet synthesize"):
         read_fingers(path, case)
 

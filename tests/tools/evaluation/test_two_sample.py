@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet_tools.evaluation import two_sample, windows
+from manipnet_tools.evaluation import metrics, two_sample, windows
 
 HAND = shipped_hand()
 
@@ -15,8 +15,8 @@ def takes(rng, shift: float = 0.0, scale: float = 1.0) -> list[np.ndarray]:
 
 
 def test_the_area_under_the_curve_counts_pairs():
-    assert two_sample.auc(np.array([0.1, 0.4, 0.35, 0.8]), np.array([0, 0, 1, 1])) == 0.75
-    assert two_sample.auc(np.zeros(4), np.array([0, 1, 0, 1])) == 0.5
+    assert two_sample.auc(np.array([0.1, 0.4, 0.35, 0.8]), np.array([False, False, True, True])) == 0.75
+    assert two_sample.auc(np.zeros(4), np.array([False, True, False, True])) == 0.5
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_windows_do_not_see_where_the_fingers_are(cases):
     case = cases["mug1"].part(0.4, 0.6)
     hand = case.captured["right"]
     rows = windows.window_rows(case, "right", hand)
-    frames = len(case) - windows.SETTLE_FRAMES
+    frames = len(case) - metrics.SETTLE_FRAMES
     assert len(rows) == (frames - windows.WINDOW_FRAMES) // windows.STEP_FRAMES + 1
     joints = HAND.joint_count - 1
     moved = windows.window_rows(case, "right", hand + np.array([0.0, 0.3, 0.0]))

@@ -1,5 +1,6 @@
 """`manipnet evaluate`: roll-outs on held-out takes, compared with captured fingers and with hands without a network."""
 
+import importlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -39,6 +40,8 @@ def run(options: EvaluateOptions) -> None:
 
 
 def _protocol(options: EvaluateOptions, progress: Progress) -> tuple[dict[str, Any], list[Table]]:
+    if "drop" in options.only:
+        importlib.import_module("mujoco")  # or its absence would be noticed only after the roll-outs
     cases = load_cases(options.data)
     files = finger_files(options.fingers, [case.name for case in cases])
     takes = [folder.name for folder in take_folders(options.data, tuple(files) or options.takes)]

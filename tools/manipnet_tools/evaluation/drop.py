@@ -61,7 +61,7 @@ class DropTest:
     def fall(self, joints: Sequence[Array], down: Array) -> Fall:
         """Simulate one frame: the joints `(J, 3)` of each hand and the unit vector `down (3,)` of gravity.
 
-        A capsule whose axis is inside the object is taken out, because a hand stuck in the object would hold it.
+        A finger that enters the object ends there, because a hand stuck in the object would otherwise hold it.
         """
         positions = np.stack(joints)
         here = np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(positions), 1))
@@ -80,22 +80,29 @@ class DropTest:
         return self._fall(data, *settled)
 
     def _place(self, model: mujoco.MjModel, axes: Array, gaps: Gaps) -> None:
-        """Put the capsules where they are, or far away if inside, and press those that touch by their springs."""
+        """Put the capsules where they are, or far away if taken out, and press those that touch by their springs."""
         depth = np.maximum(-gaps.gap - OVERLAP_M, 0.0)
         middle = 0.5 * (axes[:, :, 0] + axes[:, :, -1]) + depth[..., None] * gaps.normal
-        model.body_pos[2:] = np.where(self._inside(axes)[..., None], _AWAY, middle).reshape(-1, 3)
+        model.body_pos[2:] = np.where(self._taken_out(axes)[..., None], _AWAY, middle).reshape(-1, 3)
         along = (axes[:, :, -1] - axes[:, :, 0]).reshape(-1, 3)
         for geom, direction in enumerate(along, start=model.ngeom - len(along)):
             mujoco.mju_quatZ2Vec(model.geom_quat[geom], direction)
         touching = gaps.gap < metrics.TOUCH_M
         model.qpos_spring[7:] = (-PRESS_M * touching[..., None] * gaps.normal).ravel()
 
-    def _inside(self, axes: Array) -> Mask:
-        """Which capsules have an axis that enters the object, `(hands, C)`: sampled finely, for walls are thin."""
+    def _taken_out(self, axes: Array) -> Mask:
+        """The capsules whose axis enters the object, and those beyond them on the same finger, `(hands, C)`.
+
+        No force can reach the latter through the object. The axes are sampled finely, because walls are thin.
+        """
         fractions = np.linspace(0.0, 1.0, _AXIS_POINTS)[:, None]
         points = axes[:, :, :1] + fractions * (axes[:, :, -1:] - axes[:, :, :1])
         distance = self._shape.signed_distance(points.reshape(-1, 3))[0]
-        return (distance.reshape(points.shape[:3]) < 0.0).any(axis=2)
+        out = np.any(distance.reshape(points.shape[:3]) < 0.0, axis=2, keepdims=True)[:, :, 0]
+        starts, ends = self._hand.capsules.T
+        for capsule, start in enumerate(starts):  # from the palm to the tips
+            out[:, capsule] |= out[:, ends == start].any(axis=1)
+        return out
 
     def _center(self, data: mujoco.MjData) -> Array:
         """The centre of mass, `(3,)`."""

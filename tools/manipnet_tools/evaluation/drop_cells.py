@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manipnet import geometry
-from manipnet.geometry import SIDES, Array, Side
+from manipnet.geometry import SIDES, Side
 from manipnet_tools.evaluation import metrics
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.evaluation.drop import DropTest
+from manipnet_tools.evaluation.results import Hands
 
 FRAMES = 60
 """At most this many frames of a cell are simulated, spread over all of them."""
@@ -59,12 +60,12 @@ class DropCells:
         """The number of frames that are simulated for each row."""
         return sum(len(cell.frames) for cell in self.cells.values())
 
-    def shares(self, hands: dict[Side, Array], advance: Callable[[int], None] = lambda n: None) -> dict[str, float]:
+    def shares(self, hands: Hands, advance: Callable[[int], None] = lambda n: None) -> dict[str, float]:
         """The share held in each cell; nan where it has fewer than ten frames.
 
         `hands` are joints `(T, J, 3)` by side in the canonical wrist frame; `advance` receives the frames done.
         """
-        on_object = {side: self._case.on_object(side, positions) for side, positions in hands.items()}
+        on_object: Hands = {side: self._case.on_object(side, p) for side, p in hands.items()}
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             held = {
                 name: list(pool.map(lambda frame, cell=cell: self._held(on_object, cell, frame, advance), cell.frames))
@@ -72,7 +73,7 @@ class DropCells:
             }
         return {name: float(np.mean(of)) if len(of) >= FEWEST else float("nan") for name, of in held.items()}
 
-    def _held(self, on_object: dict[Side, Array], cell: Cell, frame: int, advance: Callable[[int], None]) -> bool:
+    def _held(self, on_object: Hands, cell: Cell, frame: int, advance: Callable[[int], None]) -> bool:
         fall = self._tests[len(cell.sides)].fall([on_object[side][frame] for side in cell.sides], self._down[frame])
         advance(1)
         return fall.held

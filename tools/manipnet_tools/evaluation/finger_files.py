@@ -25,9 +25,9 @@ def finger_files(texts: Sequence[str], takes: Sequence[str]) -> dict[str, Path]:
     return files
 
 
-def fingers_of(files: dict[str, Path]) -> Callable[[Fold], list[Hands]]:
+def fingers_of(files: dict[str, Path]) -> Callable[[Fold, Callable[[int], None]], list[Hands]]:
     """The row of an evaluation that reads these files, by take."""
-    return lambda fold: [read_fingers(files[case.name], case) for case in fold.test]
+    return lambda fold, advance: [read_fingers(files[case.name], case) for case in fold.test]
 
 
 def read_fingers(path: Path, case: Case) -> Hands:

@@ -10,7 +10,7 @@ from manipnet.geometry import Array, Side
 from manipnet_tools.evaluation import guards, metrics, physics, regrasps
 from manipnet_tools.evaluation.cases import Case
 from manipnet_tools.evaluation.metrics import Gaps, Mask
-from manipnet_tools.evaluation.options import Measures
+from manipnet_tools.evaluation.options import MeasureGroup
 from manipnet_tools.evaluation.results import Hands
 from manipnet_tools.evaluation.scoring import Score
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 class Judge:
     """What the measures prepare once for a case; `mean_pose (J, 3)` is the training data's."""
 
-    def __init__(self, case: Case, mean_pose: Array, measures: Collection[Measures]) -> None:
-        self._of_hand = {side: HandJudge(case, side, mean_pose) for side in case.captured}
-        self._case, self._scored = case, "scores" in measures
-        self._drop = _drop_cells(case) if "drop" in measures else None
+    def __init__(self, case: Case, mean_pose: Array, groups: Collection[MeasureGroup]) -> None:
+        self._of_hand: dict[Side, HandJudge] = {side: HandJudge(case, side, mean_pose) for side in case.captured}
+        self._case, self._scored = case, "scores" in groups
+        self._drop = _drop_cells(case) if "drop" in groups else None
 
     @property
     def drops(self) -> int:
@@ -33,9 +33,9 @@ class Judge:
 
     def __call__(self, hands: Hands, advance: Callable[[int], None] = lambda n: None) -> dict[Side, Score]:
         """The scores of `hands` by side; `advance` receives the number of frames that were dropped."""
-        scores = dict.fromkeys(hands, Score())
+        scores: dict[Side, Score] = dict.fromkeys(hands, Score())
         if self._scored:
-            gaps = {side: self._case.gaps_of(side, positions) for side, positions in hands.items()}
+            gaps: dict[Side, Gaps] = {side: self._case.gaps_of(side, positions) for side, positions in hands.items()}
             shares = _physics_shares(self._case, gaps)
             scores = {
                 side: replace(self._of_hand[side].score(positions, gaps[side]), **shares)
@@ -68,7 +68,8 @@ class HandJudge:
     """The measures of one hand of a case, without its first second, and what they need of the captured hand."""
 
     def __init__(self, case: Case, side: Side, mean_pose: Array) -> None:
-        self._case, self._side = case, side
+        self._case = case
+        self._side: Side = side
         self._hand, self._captured, self._gaps = case.hand, case.captured[side], case.gaps[side]
         self._counts = metrics.settled(len(case))
         self._near, self._idle = metrics.near(self._gaps) & self._counts, metrics.idle(self._gaps) & self._counts

@@ -16,10 +16,10 @@ EvaluationProtocol = Literal["seen", "unseen"]
 PROTOCOLS: Final[tuple[EvaluationProtocol, ...]] = ("seen", "unseen")
 Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
 
-Measures = Literal["scores", "drop", "realism"]
+MeasureGroup = Literal["scores", "drop", "realism"]
 """scores: joint error, contacts, penetration, motion and physics. drop: the drop test. realism: whether a classifier
 can tell the motion from captured motion."""
-MEASURES: Final[tuple[Measures, ...]] = ("scores", "drop", "realism")
+MEASURE_GROUPS: Final[tuple[MeasureGroup, ...]] = ("scores", "drop", "realism")
 
 ABLATION_TRAINING: Final = TrainConfig(
     architecture="manipnet", rounds=1, epochs_per_round=6, on_policy=0.0, huber=0.0, weight_average=0.99, response=0.4
@@ -44,7 +44,7 @@ class EvaluateOptions:
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""
-    only: tuple[Measures, ...] = MEASURES
+    only: tuple[MeasureGroup, ...] = MEASURE_GROUPS
     """Measure only these; drop needs the extra `judge`."""
     fingers: tuple[str, ...] = ()
     """Judge files of `manipnet synthesize` (TAKE=FILE.npz) instead of models. Only the takes named here are tested."""

@@ -10,7 +10,7 @@ from manipnet_tools.evaluation import baselines
 from manipnet_tools.evaluation.baselines import held
 from manipnet_tools.evaluation.cases import SEEN_SHARE, Case
 from manipnet_tools.evaluation.judge import Judge
-from manipnet_tools.evaluation.options import EvaluationProtocol, Measures
+from manipnet_tools.evaluation.options import EvaluationProtocol, MeasureGroup
 from manipnet_tools.evaluation.results import (
     CAPTURED,
     HOLD,
@@ -24,8 +24,8 @@ from manipnet_tools.evaluation.results import (
 )
 from manipnet_tools.takes.rollout import roll_out
 
-Source = Callable[[Fold], list[Hands]]
-"""Makes the hands of one row for each test case of a fold."""
+Source = Callable[[Fold, Callable[[int], None]], list[Hands]]
+"""Makes the hands of one row for each test case of a fold; it may report the number of hand-ticks done."""
 
 
 def folds(cases: Sequence[Case], protocol: EvaluationProtocol, takes: Container[str]) -> list[Fold]:
@@ -46,19 +46,20 @@ def evaluate(
     protocol: EvaluationProtocol,
     sources: dict[str, Source],
     progress: Progress,
-    measures: Collection[Measures] = ("scores",),
+    groups: Collection[MeasureGroup] = ("scores",),
 ) -> Results:
     """Judge the captured fingers, the mean pose and the hands of every source, by name, on every fold."""
     rows: dict[str, Row] = {}
-    task = progress.add_task(protocol, total=len(sources) * sum(len(case) for fold in folds for case in fold.test))
+    task = progress.add_task(protocol, total=len(sources) * sum(map(_hand_ticks, folds)))
     for fold in folds:
         mean = baselines.mean_pose(fold.train)
         hands = {CAPTURED: [case.captured for case in fold.test], MEAN: [held(case, mean) for case in fold.test]}
         for name, source in sources.items():
-            hands[name] = source(fold)
-            progress.advance(task, sum(map(len, fold.test)))
+            done = progress.tasks[task].completed
+            hands[name] = source(fold, lambda n: progress.advance(task, n))
+            progress.update(task, completed=done + _hand_ticks(fold))
         for k, case in enumerate(fold.test):
-            judge = Judge(case, mean, measures)
+            judge = Judge(case, mean, groups)
             drops = progress.add_task(f"drop {case.name}", total=judge.drops * len(hands), visible=judge.drops > 0)
             for name, of_cases in hands.items():
                 row = rows.setdefault(name, Row())
@@ -67,10 +68,16 @@ def evaluate(
     return Results(protocol, {case.name: case for fold in folds for case in fold.test}, rows)
 
 
+def _hand_ticks(fold: Fold) -> int:
+    return 2 * sum(map(len, fold.test))
+
+
 def model_rows(models: dict[str, Callable[[Fold], Bundle]], solvers: Sequence[str]) -> dict[str, Source]:
     """A row for every model with every solver."""
     return {
-        row_name(name, solver): lambda fold, model=model, solver=solver: synthesise(model(fold), solver, fold.test)
+        row_name(name, solver): lambda fold, advance, model=model, solver=solver: synthesise(
+            model(fold), solver, fold.test, advance
+        )
         for name, model in models.items()
         for solver in solvers
     }
@@ -79,12 +86,12 @@ def model_rows(models: dict[str, Callable[[Fold], Bundle]], solvers: Sequence[st
 def baseline_rows(model: Callable[[Fold], Bundle]) -> dict[str, Source]:
     """The fingers of the nearest training frame, and the neutral pose of a model for every frame."""
 
-    def nearest(fold: Fold) -> list[Hands]:
+    def nearest(fold: Fold, advance: Callable[[int], None]) -> list[Hands]:
         bundle = model(fold)
         retrieve = baselines.Retrieval(fold.train, bundle.hand, Synthesizer(bundle).rest_state())
         return [retrieve(case) for case in fold.test]
 
-    def hold(fold: Fold) -> list[Hands]:
+    def hold(fold: Fold, advance: Callable[[int], None]) -> list[Hands]:
         rest = Synthesizer(model(fold)).rest_state()
         return [held(case, rest.positions) for case in fold.test]
 

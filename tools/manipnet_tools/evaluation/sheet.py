@@ -16,7 +16,7 @@ COLUMNS = 4
 
 
 def write_sheet(results: Results, ours: str, path: Path, rng: np.random.Generator | None = None) -> Path:
-    """Write pairs of pictures to `path` and the key to `path` with the suffix `.txt`, which is returned.
+    """Write pairs of pictures to `path` and the key to `path` with the suffix `.key.txt`, which is returned.
 
     Each pair shows one frame in which a captured hand holds the lifted object, as captured and as in the row `ours`, in
     an order that `rng` draws.
@@ -35,6 +35,6 @@ def write_sheet(results: Results, ours: str, path: Path, rng: np.random.Generato
                 ]
                 key.append(f"pair {len(key)}: {'right' if second else 'left'}   {take}, {side} hand, tick {frame}")
     save_png(contact_sheet(pictures, COLUMNS), path)
-    answers = path.with_suffix(".txt")
+    answers = path.with_suffix(".key.txt")
     answers.write_text("\n".join(key) + "\n", encoding="utf-8")
     return answers

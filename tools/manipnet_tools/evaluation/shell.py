@@ -27,7 +27,7 @@ def shell_pieces(mesh: ClosedMesh, count: int = PIECES) -> list[Array]:
     size = np.linalg.norm(cross, axis=1)
     corners, normals = corners[size > 0.0], cross[size > 0.0] / size[size > 0.0, None]
     features = np.concatenate([corners.mean(axis=1), NORMAL_WEIGHT_M * normals], axis=1)
-    _, group = kmeans2(features, count, minit="++", rng=np.random.default_rng(0), missing="warn")
+    group = np.asarray(kmeans2(features, count, minit="++", rng=np.random.default_rng(0), missing="warn")[1])
     return [_piece(corners[group == k], normals[group == k]) for k in np.unique(group)]
 
 

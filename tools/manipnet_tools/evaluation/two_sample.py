@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from scipy.special import expit
 from scipy.stats import rankdata
 
 from manipnet.geometry import Array
+from manipnet_tools.evaluation.metrics import Mask
 
 RIDGE = 1e-2
 """Penalty on the squared weights, relative to the mean loss of a window."""
@@ -32,14 +33,13 @@ class Standard:
         return np.clip((rows - self.mean) / self.scale, -5.0, 5.0)
 
 
-def auc(scores: Array, positive: Array) -> float:
+def auc(scores: Array, positive: Mask) -> float:
     """Probability that a positive row has a larger score than a negative one; a tie counts half."""
-    positive = np.asarray(positive, dtype=bool)
     ranks, count, others = rankdata(scores), positive.sum(), (~positive).sum()
     return float((ranks[positive].sum() - count * (count + 1) / 2) / (count * others))
 
 
-def fit(rows: Array, positive: Array) -> Array:
+def fit(rows: Array, positive: Mask) -> Array:
     """Weights `(D + 1,)`, the last a constant, of a logistic regression that weighs both classes alike."""
     inputs = np.concatenate([rows, np.ones((len(rows), 1))], axis=1)
     sign = np.where(positive, 1.0, -1.0)
@@ -96,6 +96,6 @@ def covered(rows: Array, by: Array) -> float:
     Of synthesised rows by captured ones this is the precision, the other way round the recall (Kynkäänniemi et al.,
     2019).
     """
-    reach = cKDTree(by).query(by, NEIGHBOURS + 1)[0][:, -1]
+    reach = KDTree(by).query(by, NEIGHBOURS + 1)[0][:, -1]
     distance = np.sqrt(np.maximum((rows**2).sum(1)[:, None] + (by**2).sum(1) - 2.0 * rows @ by.T, 0.0))
     return float((distance <= reach).any(axis=1).mean())

@@ -6,7 +6,7 @@ are reached. All motions are low-passed alike first, because otherwise the tremo
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.signal import butter, filtfilt
+from scipy.signal import butter, sosfiltfilt
 
 from manipnet.geometry import Array, Side, quat_exp, quat_rotate
 from manipnet.synthesis.hand.hand import Hand
@@ -30,8 +30,7 @@ def window_rows(case: Case, side: Side, positions: Array) -> Array:
 
 
 def _low_passed(positions: Array) -> Array:
-    b, a = butter(2, LOW_PASS_HZ, fs=TICK_HZ)
-    return np.asarray(filtfilt(b, a, positions, axis=0))
+    return np.asarray(sosfiltfilt(butter(2, LOW_PASS_HZ, fs=TICK_HZ, output="sos"), positions, axis=0))
 
 
 def _rows(positions: Array, gap: Array) -> Array:
@@ -60,11 +59,11 @@ def _windows(values: Array) -> Array:
 
 def shaken(hand: Hand, positions: Array, rng: np.random.Generator) -> Array:
     """The motion `(T, J, 3)` with every finger joint bent by slow noise of 3° (standard deviation)."""
-    b, a = butter(2, NOISE_HZ, fs=TICK_HZ)
+    slow = butter(2, NOISE_HZ, fs=TICK_HZ, output="sos")
     shaken = positions.copy()
     for finger in hand.fingers:
         for k, joint in enumerate(finger[:-1]):
-            noise = filtfilt(b, a, rng.normal(size=len(positions)))
+            noise = np.asarray(sosfiltfilt(slow, rng.normal(size=len(positions))))
             bend = np.radians(NOISE_DEGREES) * noise / noise.std()
             turn = quat_exp(bend[:, None] * np.array([0.0, 1.0, 0.0]))
             beyond, pivot = list(finger[k + 1 :]), shaken[:, joint, None]
