@@ -137,6 +137,13 @@ def test_files_are_named_by_take():
         finger_files(["spoon=a.npz"], ["mug1"])
 
 
+def test_short_takes_have_no_realism(cases, still_model):
+    bundle = load_bundle(still_model)
+    fold = Fold("seen", [cases["mug1"].part(0.0, 0.2)], [cases["mug1"].part(0.4, 0.44)])
+    rows = evaluate([fold], "seen", model_rows({"still": lambda fold: bundle}, ["none"]), Progress(disable=True), ())
+    assert realism(rows) == {}
+
+
 def test_a_hand_that_never_moves_is_told_from_captured_hands(cases, still_model):
     bundle = load_bundle(still_model)
     parts = [case.part(0.3, 0.6) for case in cases.values()]

@@ -82,6 +82,12 @@ def test_windows_do_not_see_where_the_fingers_are(cases):
     assert not np.allclose(moved[:, 4 * joints :], rows[:, 4 * joints :])  # the gaps differ
 
 
+def test_a_take_that_is_too_short_has_no_window(cases):
+    part = cases["mug1"].part(0.4, 0.44)
+    longer = windows.window_rows(cases["mug1"].part(0.4, 0.5), "left", cases["mug1"].part(0.4, 0.5).captured["left"])
+    assert windows.window_rows(part, "left", part.captured["left"]).shape == (0, longer.shape[1])
+
+
 def test_noise_on_captured_motion_is_found_and_its_halves_are_alike(cases):
     rng = np.random.default_rng(0)
     parts = [case.part(start, start + 0.3) for case in cases.values() for start in (0.1, 0.4, 0.7)]

@@ -12,6 +12,7 @@ from manipnet_tools.evaluation.windows import shaken, window_rows
 
 FLOOR, CEILING = "captured, halves", "captured + 3° noise"
 """The captured hands' first halves against their second halves, and against themselves with noise added."""
+FEWEST_WINDOWS = 40
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,17 @@ class Realism:
 
 
 def realism(results: Results) -> dict[str, Realism]:
-    """The realism of every row but the captured, between the floor and the ceiling that belong to it."""
+    """The realism of every row but the captured, between the floor and the ceiling that belong to it.
+
+    The result is empty if the takes have fewer than 40 windows in all, which is ten seconds of both hands.
+    """
     windows = {
         name: [_both_hands(case, row.hands[take]) for take, case in results.cases.items()]
         for name, row in results.rows.items()
     }
     captured = windows.pop(CAPTURED)
+    if sum(len(rows) for hands in captured for rows in hands) < FEWEST_WINDOWS:
+        return {}
     rng = np.random.default_rng(0)
     noisy = [
         _both_hands(case, {side: shaken(case.hand, positions, rng) for side, positions in case.captured.items()})

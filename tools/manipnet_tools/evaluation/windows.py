@@ -24,7 +24,9 @@ _STILL = 1e-3
 
 
 def window_rows(case: Case, side: Side, positions: Array) -> Array:
-    """The windows of a hand in the order of time, `(N, D)`; the first second is left out."""
+    """The windows of a hand in the order of time, `(N, D)`; the first second is left out, and `N` may be 0."""
+    if len(positions) < SETTLE_FRAMES + WINDOW_FRAMES:
+        return np.empty((0, 4 * (case.hand.joint_count - 1) + 2 * len(case.hand.radii)))
     gap = case.gaps_of(side, positions).gap[SETTLE_FRAMES:]
     return _rows(_low_passed(positions[SETTLE_FRAMES:]), gap)
 
@@ -58,7 +60,12 @@ def _windows(values: Array) -> Array:
 
 
 def shaken(hand: Hand, positions: Array, rng: np.random.Generator) -> Array:
-    """The motion `(T, J, 3)` with every finger joint bent by slow noise of 3° (standard deviation)."""
+    """The motion `(T, J, 3)` with every finger joint bent by slow noise of 3° (standard deviation).
+
+    A motion shorter than a window is returned as it is, because it is never compared.
+    """
+    if len(positions) < WINDOW_FRAMES:
+        return positions
     slow = butter(2, NOISE_HZ, fs=TICK_HZ, output="sos")
     shaken = positions.copy()
     for finger in hand.fingers:
