@@ -24,7 +24,7 @@ def fuzz_seconds(pytestconfig: pytest.Config) -> float | None:
 @pytest.fixture
 def fuzz_seed(pytestconfig: pytest.Config) -> int:
     """The seed of a fuzz test."""
-    return pytestconfig.getoption("fuzz_seed", DEFAULT_SEED)
+    return int(pytestconfig.getoption("fuzz_seed", DEFAULT_SEED) or DEFAULT_SEED)
 
 
 @pytest.fixture

@@ -171,7 +171,7 @@ def test_a_later_version_with_longer_bodies_is_still_read():
     bodies = [Body(1), Body(2)]
     for body in bodies:
         written = body.write()
-        body.write = lambda version, written=written: written + b"more"
+        body.write = lambda version, written=written: written + b"more"  # pyright: ignore[reportAttributeAccessIssue]
     frame = read_frame(Frame(bodies=bodies).write((4, 5)), (4, 9))
     assert [body.id for body in frame.bodies] == [1, 2]
 

@@ -230,7 +230,7 @@ def test_ticks_go_on_if_nobody_can_be_shown_them(bench: Bench, caplog) -> None:
         def see(self, *_: object) -> None:
             raise OSError("the page has gone")
 
-    bench.loop._observer = Broken()
+    bench.loop._observer = Broken()  # pyright: ignore[reportAttributeAccessIssue]: it fails whatever it is given
     assert len(bench.play(1.0)) == len(bench.messages) > 0
     assert "a tick cannot be shown on the page" in caplog.text
 

@@ -27,7 +27,7 @@ class FakeMotive:
         self.version = version
         self.info = info or server_info(version, CLOCK_HZ, data_port, group)
         self.models = models
-        self.skeletons = None
+        self.skeletons: dict[int, tuple[str, dict[int, str]]] | None = None
         self.names = {} if names is None else names
         self.clock_offset_s = 5_000.0
         self.requests = {}

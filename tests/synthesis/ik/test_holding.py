@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from compiled import call
 
-from manipnet.geometry import compose, invert, quat_exp, quat_rotate, transform
+from manipnet.geometry import Side, compose, invert, quat_exp, quat_rotate, transform
 from manipnet.jit import kernel
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.ik.chains import Surface
@@ -46,7 +46,7 @@ def bar(tmp_path_factory):
     return build_shape(closed_mesh(mesh.vertices, mesh.faces, "bar"), tmp_path_factory.mktemp("cache"))
 
 
-def scene(shape, speed_m_s, side="right", bar_moves=True):
+def scene(shape, speed_m_s, side: Side = "right", bar_moves=True):
     """A hand with the palm down that moves along x at a constant speed, with the bar in it or at rest below it."""
     offsets = np.linspace(-0.5, 0.5, 21)
     wrist = np.stack([np.concatenate([[speed_m_s * t, 1.0, 0.0], PALM_DOWN]) for t in offsets])

@@ -17,8 +17,8 @@ def test_what_is_left_is_what_scipy_leaves(seed, count, one_sided):
     columns, wanted = rng.normal(size=(count, 6)), 5.0 * rng.normal(size=6)
     if one_sided:
         columns[:, 2] = np.abs(columns[:, 2])
-    left = nnls(columns.T, wanted)[1]
-    assert call(unexplained, columns, count, wanted, 1e-9) == pytest.approx(left, abs=1e-4 * np.linalg.norm(wanted))
+    left, scale = nnls(columns.T, wanted)[1], float(np.linalg.norm(wanted))
+    assert call(unexplained, columns, count, wanted, 1e-9) == pytest.approx(left, abs=1e-4 * scale)
 
 
 def test_only_the_first_columns_count():

@@ -17,6 +17,7 @@ from natnet_writer import Body, Frame, server_info
 from osc_streams import HZ, bodies, bridge, milliseconds, stream, transformation, vmc
 from osc_writer import bundle, osc
 
+from manipnet.runtime.run_file import running_servers
 from manipnet_tools.doctor import command as doctor
 
 RIG = """
@@ -464,7 +465,7 @@ def test_a_server_is_found_by_itself_and_its_answer_is_in_its_status(tiny_bundle
         findings = server.ask({"op": "status"})["doctor"]
         assert any("nothing arrives at all" in finding["text"] for finding in findings)
         assert all(finding["remedy"] for finding in findings if finding["level"] == "problem")
-    assert not doctor.running_servers()
+    assert not running_servers()
 
 
 def test_a_server_with_keys_says_what_is_missing(tiny_bundle, tmp_path, capsys, monkeypatch):

@@ -22,7 +22,7 @@ NORMAL_WEIGHT_M = 0.02
 def shell_pieces(mesh: ClosedMesh, count: int = PIECES) -> list[Array]:
     """The points `(n, 3)` whose convex hulls cover the surface of the mesh, in its frame; about `count` pieces."""
     vertices, faces = subdivide_to_size(mesh.vertices, mesh.faces, LONGEST_EDGE_M, max_iter=12)[:2]
-    corners = np.asarray(vertices)[faces]
+    corners = np.asarray(vertices)[np.asarray(faces)]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.linalg.norm(cross, axis=1)
     corners, normals = corners[size > 0.0], cross[size > 0.0] / size[size > 0.0, None]

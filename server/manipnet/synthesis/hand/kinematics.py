@@ -30,7 +30,7 @@ def _apply_offset_into(parent_position: Array, parent_rotation: Array, offset: A
 
 
 @inner
-def pose_bone_into(skeleton: Skeleton, bone: int, angles: Array, positions: Array, rotations: Array, axes: Array):
+def pose_bone_into(skeleton: Skeleton, bone, angles: Array, positions: Array, rotations: Array, axes: Array):
     """Place one bone after its parent: row `bone` of `positions (J, 3)` and `rotations (B, 3, 3)`, and its `axes`."""
     hinges, hinge, turned = skeleton.axes, matrix(), matrix()
     parent = skeleton.parents[bone]
@@ -51,7 +51,7 @@ def pose_bone_into(skeleton: Skeleton, bone: int, angles: Array, positions: Arra
 
 
 @inner
-def pose_tip_into(skeleton: Skeleton, tip: int, positions: Array, rotations: Array):
+def pose_tip_into(skeleton: Skeleton, tip, positions: Array, rotations: Array):
     """Place one fingertip after its bone."""
     parent = skeleton.parents[tip]
     _apply_offset_into(positions[parent], rotations[parent], skeleton.offsets[tip], positions[tip])

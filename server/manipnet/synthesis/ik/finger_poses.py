@@ -23,7 +23,7 @@ _END_JOINT_SHARE = 0.6
 
 
 @inner
-def _tried(reference: float, low: float, high: float, index: int, count: int, wide: bool):
+def _tried(reference, low, high, index, count, wide: bool):
     """Value `index` of the `count` to try for an angle: over its range, or about the reference, finest near it."""
     if count == 1:
         return reference
@@ -65,7 +65,7 @@ def _touch(chains: Chains, finger: int, positions: Array, surface: Surface):
 
 
 @inner
-def _keep(chains: Chains, finger: int, angles: Array, cost: float, found: int, costs: Array, poses: Array):
+def _keep(chains: Chains, finger: int, angles: Array, cost, found, costs: Array, poses: Array):
     """Insert a pose into the cheapest ones found so far; returns their number."""
     at = min(found, MOST_POSES - 1)
     while at > 0 and costs[at - 1] > cost:
