@@ -19,6 +19,7 @@ from osc_writer import bundle, osc
 
 from manipnet.runtime.run_file import running_servers
 from manipnet_tools.doctor import command as doctor
+from manipnet_tools.doctor import examination
 
 RIG = """
 [bodies]
@@ -46,7 +47,7 @@ class Ports:
 
 @pytest.fixture
 def ports(monkeypatch) -> Ports:
-    monkeypatch.setattr(doctor, "ANSWER_S", 0.2)
+    monkeypatch.setattr(examination, "ANSWER_S", 0.2)
     with socket.socket() as tcp, socket.socket() as other, socket.socket(type=socket.SOCK_DGRAM) as udp:
         for made in (tcp, other, udp):
             made.bind(("127.0.0.1", 0))
@@ -445,7 +446,7 @@ def test_the_running_server_and_the_listening_doctor_agree(name, ports, rig, tin
         server: LiveServer = opened.enter_context(
             serving(f"--rig={rig}", "--model", str(tiny_bundle), *ports.options, *options)
         )
-        monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
+        monkeypatch.setattr(examination, "ANSWER_S", 20.0)
         for _ in range(40):
             doctor.main(ports.options)
             reported = troubles(capsys.readouterr().out.splitlines())
@@ -457,7 +458,7 @@ def test_the_running_server_and_the_listening_doctor_agree(name, ports, rig, tin
 
 
 def test_a_server_is_found_by_itself_and_its_answer_is_in_its_status(tiny_bundle, capsys, monkeypatch):
-    monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
+    monkeypatch.setattr(examination, "ANSWER_S", 20.0)
     with serving("--model", str(tiny_bundle)) as server:
         assert doctor.main([]) == 1  # the control port is a random one
         output = capsys.readouterr().out
@@ -472,7 +473,7 @@ def test_a_server_with_keys_says_what_is_missing(tiny_bundle, tmp_path, capsys, 
     from manipnet.net.curve_keys import make_server_keys
 
     make_server_keys(tmp_path)
-    monkeypatch.setattr(doctor, "ANSWER_S", 0.5)
+    monkeypatch.setattr(examination, "ANSWER_S", 0.5)
     with serving("--model", str(tiny_bundle), f"--keys={tmp_path}"):
         assert doctor.main([]) == 1
     output = capsys.readouterr().out

@@ -34,7 +34,7 @@ def read_fingers(path: Path, case: Case) -> Hands:
     """The hands in a file at the ticks of a case. Raises `DataError` if the file lacks arrays or ticks."""
     wanted = ("time", *(f"{side}_positions" for side in SIDES))
     try:
-        with np.load(path) as arrays:
+        with np.load(path, allow_pickle=False) as arrays:
             time_s, *world = (arrays[name] for name in wanted)
     except (OSError, ValueError, KeyError) as error:
         raise DataError(f"{path}: is not a file of manipnet synthesize ({error})") from None
