@@ -267,7 +267,7 @@ LIVE = {
     "the bridge's mode for SPARCK": ("ids", sparck),
     "the bridge's mode for SPARCK, loose": (
         "ids",
-        lambda k: [sparck(k)[0][i : i + n] for i, n in _elements(sparck(k)[0])],
+        lambda k: list(_elements(sparck(k)[0])),
     ),
     "Virtual Motion Tracker in Unity's axes": ("ids", vmt("Unity")),
     "Virtual Motion Tracker in the driver's axes": ("ids", vmt("Driver")),

@@ -58,9 +58,9 @@ def test_a_port_in_use_is_named_with_its_option(
     ("options", "complaint"),
     [
         (["--model", "colossus"], "model 'colossus' is neither a folder nor a shipped bundle"),
-        (["--mesh", "Box"], "'Box' is not NAME=FILE"),
-        (["--mesh", "Box=nowhere.obj"], "nowhere.obj: no such file"),
-        (["--mesh", "Box=readme.txt"], "readme.txt: the format '.txt' is unknown; allowed are .obj, .ply, .stl, .glb"),
+        (["--mesh", "Box"], "--mesh Box: must be NAME=FILE"),
+        (["--mesh", "Box=nowhere.obj"], "nowhere.obj: cannot be read (No such file or directory)"),
+        (["--mesh", f"Box={__file__}"], "the format '.py' is unknown; allowed are .obj, .ply, .stl, .glb"),
         (["--rig", "nowhere.toml"], "nowhere.toml: cannot be read"),
         (["--rig", "r.toml", "--mesh", "Box=x.obj"], "--rig cannot be combined with --mesh or --demo"),
         (["--host", "0.0.0.0"], "--host 0.0.0.0 can be reached from other machines"),

@@ -426,7 +426,6 @@ AGREEING = (
     "a pose of NaN",
     "garbage over OSC",
     "a t that is always zero",
-    "a PUSH socket",
 )
 
 
