@@ -123,7 +123,11 @@ bodies.left_wrist = "bob_left"
             2,
             "server.objects_unit is 'yd'; it must be one of m, dm, cm, mm, in",
         ),
-        ("[server]\nsolver = 'magic'\n" + LEAST, 2, "server.solver is 'magic'; it must be one of least_squares, wrench, ccd"),
+        (
+            "[server]\nsolver = 'magic'\n" + LEAST,
+            2,
+            "server.solver is 'magic'; it must be one of least_squares, wrench, ccd",
+        ),
         ("[server]\nup = 'x'\n" + LEAST, 2, "server.up is 'x'; it must be one of y, z"),
         ("[server]\nvmc = 'a:b'\n" + LEAST, 2, "server.vmc is 'a:b'; it must be HOST or HOST:PORT with a port of 1"),
         ("[server]\nallow = ['stage']\n" + LEAST, 2, "server.allow is ['stage']; it must be addresses or networks"),

@@ -42,7 +42,7 @@ def imported(folder: str) -> set[str]:
 
 RUNTIME = named(PROJECT["dependencies"])
 PINNED_EXTRAS = {name: extra for name, extra in PROJECT["optional-dependencies"].items() if name != "gpu"}
-EXTRAS = named(PINNED_EXTRAS["train"]) | named(PINNED_EXTRAS["cluster"])
+EXTRAS = named([one for extra in PINNED_EXTRAS.values() for one in extra])
 
 
 OPTIONAL = {"dracopy"}
