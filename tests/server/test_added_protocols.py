@@ -16,6 +16,7 @@ from manipnet.config.rig_reader import parse_rig
 from manipnet_tools import cli as tools_cli
 from manipnet_tools.assets.doc_tables import TABLES
 from manipnet_tools.doctor import command as doctor
+from manipnet_tools.doctor import examination
 
 TOY_INPUT = '''
 """Tracked bodies as JSON datagrams, carried by pigeons."""
@@ -217,7 +218,7 @@ def free_port(kind: socket.SocketKind) -> int:
 def test_doctor_and_rig_init_listen_to_it(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(doctor, "ANSWER_S", 0.1)
+    monkeypatch.setattr(examination, "ANSWER_S", 0.1)
     port = free_port(socket.SOCK_DGRAM)
     ports = ["--input-port=0", "--osc-port=0", f"--pigeon-port={port}"]
     with Flight(port):

@@ -14,12 +14,12 @@ from manipnet.control.service import Control
 from manipnet.net.curve_keys import make_client_keys, make_server_keys, read_server_keys
 from manipnet.telemetry import Telemetry
 from manipnet_tools.doctor import command as doctor
-from manipnet_tools.doctor import listening, other_interfaces
+from manipnet_tools.doctor import examination, listening, other_interfaces
 
 
 @pytest.fixture
 def ports(monkeypatch):
-    monkeypatch.setattr(doctor, "ANSWER_S", 0.1)
+    monkeypatch.setattr(examination, "ANSWER_S", 0.1)
     with socket.socket() as tcp, socket.socket() as other, socket.socket(type=socket.SOCK_DGRAM) as udp:
         for made in (tcp, other, udp):
             made.bind(("127.0.0.1", 0))
@@ -77,7 +77,7 @@ def test_packets_for_another_address_of_this_machine(ports, capsys, monkeypatch)
 
 
 def test_a_server_with_keys_is_asked_with_a_key(ports, capsys, monkeypatch, tmp_path):
-    monkeypatch.setattr(doctor, "ANSWER_S", 20.0)
+    monkeypatch.setattr(examination, "ANSWER_S", 20.0)
     make_server_keys(tmp_path)
     path = make_client_keys(tmp_path, "stage-pc")
     handlers = {"status": lambda request: {"counters": {"frames_in": {"osc": 5}}, "actors": {}}}
