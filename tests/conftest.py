@@ -25,10 +25,28 @@ PATIENCE_S = 20.0
 STARTS_PROCESSES = {"subprocess", "multiprocessing", "serving", "publishing", "browsing", "run_node"}
 """A module that imports one of these has tests that start programs."""
 TESTS = Path(__file__).parent
+CLIENTS = TESTS / "clients"
 SLOW = tuple(
-    TESTS / place for place in ("fuzz", "tools/training", "tools/bench", "tools/doctor", "runtime/test_bad_network.py")
+    TESTS / place
+    for place in (
+        "fuzz",
+        "net/test_supervised.py",
+        "packaging/test_dependencies.py",
+        "runtime/test_bad_network.py",
+        "runtime/test_object_catalog.py",
+        "synthesis/ik",  # compiles the solvers anew
+        "tools/bench",
+        "tools/doctor",
+        "tools/importing/test_import.py",
+        "tools/training",
+    )
 )
 """Folders and files whose tests take a second each."""
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not even import what `-m quick` leaves out: that takes seconds too."""
+    return True if config.option.markexpr == "quick" and collection_path in (CLIENTS, *SLOW) else None
 
 
 def pytest_configure() -> None:
@@ -45,7 +63,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark each test by what it needs; what needs nothing special and is not marked `slow` is `quick`."""
     for item in items:
         fixtures, module = getattr(item, "fixturenames", ()), getattr(item, "module", None)
-        if item.path.is_relative_to(TESTS / "clients"):
+        if item.path.is_relative_to(CLIENTS):
             item.add_marker("client")
         if any(map(item.path.is_relative_to, SLOW)):
             item.add_marker("slow")

@@ -131,7 +131,6 @@ def test_a_file_that_becomes_invalid_is_named_and_its_shape_stays(folder: Path, 
     assert catalog.problems() == {}
 
 
-@pytest.mark.slow
 def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     path, done, tries = folder / "crate.ply", threading.Event(), []
     box(path, 0.05)
@@ -152,7 +151,6 @@ def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     assert len(tries) == 2
 
 
-@pytest.mark.slow
 def test_a_large_file_is_prepared_by_another_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
@@ -202,7 +200,6 @@ class Scene:
         return {side: hand.prop for side, hand in self.actor.hands.items()}
 
 
-@pytest.mark.slow
 def test_two_objects_one_in_each_hand_at_the_same_time(bundle: Bundle) -> None:
     catalog = ObjectCatalog()
     scene = Scene(bundle, catalog)

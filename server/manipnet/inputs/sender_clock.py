@@ -32,6 +32,7 @@ AHEAD_S: Final = 0.1
 FORGOTTEN_FRAMES: Final = 30
 """A clock that was no longer stated must be stated so often in a row before it is used again."""
 _RATE_FRAMES: Final = 32
+_STILL: Final = "stands still"
 
 
 class Clock:
@@ -91,21 +92,21 @@ class Clock:
     def _judge(self, now_s: float) -> None:
         elapsed_s, passed_s = now_s - self._begun_at_s, self._last_s - self._begun_s
         if self._still >= STILL_FRAMES and now_s - self._still_since_s >= STILL_S:
-            self._condemn("stands still")
+            self._condemn(_STILL)
         elif (
             self.runs is None
             and self._frames >= STILL_FRAMES
             and elapsed_s >= 0.5 * WINDOW_S
             and passed_s < MUCH_TOO_SLOW * elapsed_s
         ):
-            self._condemn(_speed(passed_s / elapsed_s))
+            self._condemn(_speed(passed_s, elapsed_s))
         if elapsed_s < WINDOW_S or self._frames < STILL_FRAMES:
             return
         speed = passed_s / elapsed_s
         if not self._plausible[0] <= speed <= self._plausible[1]:
             self._bad += 1
             if self._bad > 1:
-                self._condemn(_speed(speed))
+                self._condemn(_speed(passed_s, elapsed_s))
         elif self._steps < MOVING_SHARE * self._frames:
             self._bad += 1
             if self._bad > 1:
@@ -180,5 +181,6 @@ class SenderClock:
         return t_s
 
 
-def _speed(speed: float) -> str:
-    return f"advances by {speed:.3g} s per second"
+def _speed(passed_s: float, elapsed_s: float) -> str:
+    """The fault of a clock that advanced by `passed_s` in `elapsed_s` of ours."""
+    return _STILL if abs(passed_s) < STEP_S else f"advances by {passed_s / elapsed_s:.3g} s per second"

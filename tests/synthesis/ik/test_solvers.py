@@ -51,7 +51,6 @@ def solve(name, ball, angles, targets, center=FAR):
     return solved
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "within_m"), [("ccd", 2e-3), ("least_squares", 1.5e-3)])
 @settings(deadline=None)
 @given(fraction=fractions, nudge=nudges)
