@@ -52,6 +52,34 @@ def _jacobian_column(axis: Array, origin: Array, x: float, y: float, z: float):
 
 
 @inner
+def _add_pull(
+    skeleton: Skeleton,
+    chains: Chains,
+    finger: int,
+    joint: int,
+    positions: Array,
+    axes: Array,
+    apart: Array,
+    weight: float,
+    normal: Array,
+    slope: Array,
+):
+    """Add a joint of the finger, pulled along `apart (3,)`, to its normal equations."""
+    columns, bone = _columns(), skeleton.parents[joint]
+    x, y, z = positions[joint, 0], positions[joint, 1], positions[joint, 2]
+    for a in range(CHAIN_LENGTH):
+        angle = chains.angles[finger, a]
+        if angle < 0 or not angle_moves(skeleton.angle_bones, angle, bone):
+            columns[a, 0] = columns[a, 1] = columns[a, 2] = 0.0
+            continue
+        cx, cy, cz = _jacobian_column(axes[angle], positions[skeleton.angle_bones[angle]], x, y, z)
+        columns[a, 0], columns[a, 1], columns[a, 2] = cx, cy, cz
+        slope[a] += weight * (cx * apart[0] + cy * apart[1] + cz * apart[2])
+        for b in range(a + 1):
+            normal[a, b] += weight * (cx * columns[b, 0] + cy * columns[b, 1] + cz * columns[b, 2])
+
+
+@inner
 def _add_targets(
     skeleton: Skeleton,
     chains: Chains,
@@ -64,31 +92,14 @@ def _add_targets(
     slope: Array,
 ):
     """Add the finger's joints, pulled to their `targets (J, 3)`, to its normal equations."""
-    columns = _columns()
-    weight *= TARGET_WEIGHT
-    for joint in range(CHAIN_LENGTH):
-        j = chains.joints[finger, joint]
-        if j < 0:
+    apart = vector()
+    for k in range(CHAIN_LENGTH):
+        joint = chains.joints[finger, k]
+        if joint < 0:
             continue
-        bone = skeleton.parents[j]
-        for k in range(CHAIN_LENGTH):
-            angle = chains.angles[finger, k]
-            columns[k, 0] = columns[k, 1] = columns[k, 2] = 0.0
-            if angle >= 0 and angle_moves(skeleton.angle_bones, angle, bone):
-                x, y, z = _jacobian_column(
-                    axes[angle],
-                    positions[skeleton.angle_bones[angle]],
-                    positions[j, 0],
-                    positions[j, 1],
-                    positions[j, 2],
-                )
-                columns[k, 0], columns[k, 1], columns[k, 2] = x, y, z
-        for a in range(CHAIN_LENGTH):
-            for i in range(3):
-                slope[a] += weight * columns[a, i] * (targets[j, i] - positions[j, i])
-            for b in range(a + 1):
-                for i in range(3):
-                    normal[a, b] += weight * columns[a, i] * columns[b, i]
+        for i in range(3):
+            apart[i] = targets[joint, i] - positions[joint, i]
+        _add_pull(skeleton, chains, finger, joint, positions, axes, apart, TARGET_WEIGHT * weight, normal, slope)
 
 
 @inner
@@ -98,13 +109,13 @@ def _add_anchor(
     finger: int,
     positions: Array,
     axes: Array,
-    anchor: Array,
+    anchors: Array,
     surface: Surface,
     normal: Array,
     slope: Array,
 ):
     """Add the fingertip, held at its place on the object, to the finger's normal equations."""
-    columns, apart, tip = _columns(), vector(), -1
+    apart, tip, anchor = vector(), -1, ANCHOR * finger
     for k in range(CHAIN_LENGTH):
         if chains.joints[finger, k] >= 0:
             tip = chains.joints[finger, k]
@@ -112,27 +123,9 @@ def _add_anchor(
     for i in range(3):
         apart[i] = -positions[tip, i]
         for j in range(3):
-            apart[i] += r[j, i] * (anchor[1 + j] * surface.scale - t[j])
-    weight = ANCHOR_WEIGHT * anchor[0]
-    bone = skeleton.parents[tip]
-    for k in range(CHAIN_LENGTH):
-        angle = chains.angles[finger, k]
-        columns[k, 0] = columns[k, 1] = columns[k, 2] = 0.0
-        if angle >= 0 and angle_moves(skeleton.angle_bones, angle, bone):
-            x, y, z = _jacobian_column(
-                axes[angle],
-                positions[skeleton.angle_bones[angle]],
-                positions[tip, 0],
-                positions[tip, 1],
-                positions[tip, 2],
-            )
-            columns[k, 0], columns[k, 1], columns[k, 2] = x, y, z
-    for a in range(CHAIN_LENGTH):
-        for i in range(3):
-            slope[a] += weight * columns[a, i] * apart[i]
-        for b in range(a + 1):
-            for i in range(3):
-                normal[a, b] += weight * columns[a, i] * columns[b, i]
+            apart[i] += r[j, i] * (anchors[anchor + 1 + j] * surface.scale - t[j])
+    weight = ANCHOR_WEIGHT * anchors[anchor]
+    _add_pull(skeleton, chains, finger, tip, positions, axes, apart, weight, normal, slope)
 
 
 @inner
@@ -234,9 +227,8 @@ def solve_least_squares(
                 normal[k, k] = stay + 1e-9
                 slope[k] = stay * (predicted[angle] - angles[angle]) if angle >= 0 else 0.0
             _add_targets(skeleton, chains, finger, positions, axes, targets, 1.0 - weights[finger], normal, slope)
-            anchor = anchors[ANCHOR * finger : ANCHOR * (finger + 1)]
-            if anchor[0] > 0.0:
-                _add_anchor(skeleton, chains, finger, positions, axes, anchor, surface, normal, slope)
+            if anchors[ANCHOR * finger] > 0.0:
+                _add_anchor(skeleton, chains, finger, positions, axes, anchors, surface, normal, slope)
             _add_surface(
                 skeleton,
                 chains,
