@@ -6,8 +6,8 @@ and the metrics are read; every five minutes a recording of 30 s is made. Memory
 server and of its page's process, sampled every ten seconds. A line is fitted to each after a warm-up. The uncertainty
 of the line comes from averages over a minute, because neighbouring samples are correlated.
 
-It needs Chromium and Linux. The browser draws in software here, which a graphics card does elsewhere; therefore it only
-is nicer than the rest (`nice -n 15`).
+It needs Chromium and Linux. The browser draws in software here, which a graphics card does elsewhere, so it runs at a
+lower priority (`nice -n 15`).
 """
 
 import argparse
