@@ -101,7 +101,7 @@ def correct_by_wrench(problem: Problem, angles: Array, correction: Array):
     rotation, translation, targets, reference = matrix(), vector(), _targets(), _reference()
     surface = _place_surface(problem, rotation, translation, targets)
     slips, rests = slip_and_rest(problem.wrist, problem.object)
-    confidence = grasp_confidence(problem.wrist, problem.object, problem.other_wrist) * (1.0 - slips * rests)
+    confidence = grasp_confidence(problem.wrist, problem.object, problem.other_wrist)
     clear_m = CLEAR_M * slips * max(rests, 1.0 - confidence)
     grip = problem.grip
     for angle in range(len(angles)):

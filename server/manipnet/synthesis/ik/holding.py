@@ -13,7 +13,7 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_CAPSULES,
 from manipnet.synthesis.hand.kinematics import pose_finger_into
 from manipnet.synthesis.ik.contacts import CONTACT, EDGES, TOUCH_M, add_wrenches, find_contact
 from manipnet.synthesis.ik.finger_poses import MOST_POSES, touching_poses
-from manipnet.synthesis.ik.grasp import ARM_M, finger_clearance, grasp_confidence, slip_and_rest
+from manipnet.synthesis.ik.grasp import ARM_M, finger_clearance, grasp_confidence
 from manipnet.synthesis.ik.grip import (
     ARRIVING_TICKS,
     FAILED_TICKS,
@@ -46,8 +46,6 @@ TAKES, LEAVES = 0.5, 0.1
 """The confidence in a grasp at which a hand takes the object, and below which it may let go."""
 LEAVES_M = 0.012
 """A finger that is predicted to be farther than this from the object lets go."""
-HELD_AT_LEAST, LET_GO_TICKS = 30.0, 15.0
-"""A hand that has held for so long, and then moves away from an object at rest, does not take it again for so long."""
 PATIENCE_TICKS = 5
 """A grip that carries the weight but not a push may be that short of it for this long."""
 BETTER_M_S2, POSTURE_M_S2 = 0.2, 4.0
@@ -109,10 +107,7 @@ def _remember(hands: Hands, n: int):
     confidence = grasp_confidence(windows.wrist[n], windows.object[n], windows.other_wrist[n])
     for finger in range(fingers):
         nearest = min(nearest, finger_clearance(chains, finger, distances))
-    slips, rests = slip_and_rest(windows.wrist[n], windows.object[n])
-    if grip.hand[HELD_TICKS] > HELD_AT_LEAST and slips * rests > TAKES:
-        grip.hand[HELD_TICKS] = -LET_GO_TICKS
-    elif confidence > TAKES or grip.hand[HELD_TICKS] < 0.0:
+    if confidence > TAKES:
         grip.hand[HELD_TICKS] += 1.0
     elif confidence < LEAVES and nearest > LEAVES_M:
         grip.hand[HELD_TICKS] = 0.0
