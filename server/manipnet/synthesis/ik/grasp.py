@@ -101,7 +101,8 @@ def finger_confidences_into(chains: Chains, distances: Array, confidence: float,
 def slip_and_rest(wrist: Array, obj: Array):
     """How certain it is, each 0 to 1, that the object moves in the hand, and that it rests in the world.
 
-    A wrist that passes an object at rest, or that moves away from it, does not hold it at this moment. The poses `(21, 7)` are looked at 50 ms to either side of the present.
+    A wrist that passes an object at rest, or moves away from it, does not hold it at this moment. The poses `(21, 7)`
+    are looked at 50 ms to either side of the present.
     """
     turn, before = matrix(), vector()
     seen_moved = moved = near = far = 0.0
