@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from manipnet.common.options import ConfigError, Kind, shorten
-from manipnet.inputs.osc.patterns import COMPONENTS, FRAME, KEYS, Pattern
+from manipnet.inputs.osc.patterns import COMPONENTS, EULER, FRAME, KEYS, Pattern
 from manipnet.inputs.osc.space import ROTATION_ORDERS, Space, read_axes
 from manipnet.synthesis.objects.units import UNITS_M
 
@@ -64,13 +64,21 @@ def read_pattern(table: Mapping[str, Any]) -> Pattern:
     words = arguments.split()
     _check_words(address, words)
     body = table.get("body", "")
-    is_about_frame = any(word in FRAME for word in words)
-    if not body and not is_about_frame and "body" not in words and "<body>" not in address and "bone" not in words:
+    if not body and not any(word in FRAME for word in words):
+        _check_keys(address, words)
+    return Pattern(address, " ".join(words), _space(address, table, not {*EULER}.isdisjoint(words)), body=body)
+
+
+def _check_keys(address: str, words: list[str]) -> None:
+    """Raise `ConfigError` unless the address and the arguments say which body a message is about."""
+    given = {key for key in KEYS if key in words or f"<{key}>" in address}
+    if "bone" in given and "skeleton" not in given:
+        raise ConfigError(f"names a bone for {address}, but no skeleton; put <skeleton> into the address too")
+    if not given:
         raise ConfigError(
             f"does not say which body {address} is about: put <body> into the address, body into the arguments, or "
             "give body = 'NAME'"
         )
-    return Pattern(address, " ".join(words), _space(address, table, "rx" in words or "ry" in words), body=body)
 
 
 def _check_words(address: str, words: list[str]) -> None:
