@@ -10,6 +10,16 @@ import msgpack
 import natnet_writer as natnet
 from fuzz_damage import damaged, reshaped
 from fuzz_files import ACTORS, RIG, bundles, place_recording, place_rig, read_recording, recordings, toml
+from fuzz_imports import IMPORT_TARGETS
+from fuzz_senders import (
+    DECLARED,
+    GOOD_CLOCKS,
+    GOOD_DECLARED,
+    GOOD_MESSAGES,
+    judge_clock,
+    read_declared,
+    read_messages,
+)
 from fuzz_takes import FILE_TARGETS
 from osc_writer import bundle, osc
 
@@ -25,7 +35,7 @@ from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.shipped import BundleError
 from manipnet.wire.bodies import MessageError, parse_bodies
 
-VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5)]
+VERSIONS = [(3, 0), (3, 1), (4, 0), (4, 1), (4, 2), (4, 5), (2, 7), (2, 9), (2, 10)]
 
 
 @dataclass(frozen=True)
@@ -52,7 +62,8 @@ class Target:
 
 def _message(bodies: int) -> dict:
     body = {"p": [0.1, -2.0, 3.0], "q": [0.0, 0.6, 0.0, 0.8], "tracked": True}
-    return {"t": 1.5, "frame": 7, "bodies": [{"id": n, "name": f"body {n}", **body} for n in range(bodies)]}
+    timecode = {"timecode": "10:20:30;04", "timecode_rate": 29.97}
+    return timecode | {"t": 1.5, "frame": 7, "bodies": [{"id": n, "name": f"body {n}", **body} for n in range(bodies)]}
 
 
 def _pack(document: Any) -> bytes:
@@ -103,6 +114,7 @@ _NATNET = [
     for message_id, payload in (
         (7, natnet.Frame().write(version)),
         (5, natnet.definitions({1: "Box", 2: "left wrist"}, version)),
+        (5, natnet.definitions([(1, "Box"), (1, b"W\xfcrfel")], version, {5: ("Ann", {9: "LHand", 13: "RHand"})})),
         (1, natnet.server_info(version)),
         (13, bytes(range(16))),
     )
@@ -116,10 +128,14 @@ TARGETS = {
     "json": Target(_bodies, [json.dumps(_message(n)).encode() for n in (3, 0, 1, 256)], documents=(_FEW,)),
     "osc": Target(_osc, [bundle(*_OSC), *_OSC, bundle(bundle(*_OSC[:3]), bundle(*_OSC[3:]), tag=9), _LARGE]),
     "natnet": Target(_natnet, _NATNET),
+    "declared": Target(read_declared, GOOD_DECLARED, ConfigError, (DECLARED,)),
+    "declared messages": Target(read_messages, GOOD_MESSAGES),
+    "sender clock": Target(judge_clock, GOOD_CLOCKS),
     "rig": Target(load_rig, [toml(RIG), toml(ACTORS)], ConfigError, (RIG, ACTORS), toml, place_rig),
     "recording": Target(read_recording, recordings(), RecordingError, place=place_recording),
 }
-TARGETS |= {name: Target(file.read, file.good, file.error, place=file.place) for name, file in FILE_TARGETS.items()}
+FILES = FILE_TARGETS | IMPORT_TARGETS
+TARGETS |= {name: Target(file.read, file.good, file.error, place=file.place) for name, file in FILES.items()}
 if _BUNDLES is not None:
     _META, _DOCUMENTS = _BUNDLES.meta, (json.loads(_BUNDLES.meta),)
     TARGETS |= {

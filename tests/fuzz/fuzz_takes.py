@@ -64,14 +64,38 @@ def _glbs() -> list[bytes]:
     copies: Glb = box_glb(box(1, 1, 1), "i2", normalized=True)
     place = copies.array(box(1, 1, 1))
     copies.document["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": place}}}
-    return [box_glb(box(0.1, 0.1, 0.1)).bytes(), sparse.bytes(), copies.bytes()]
+    apart = box_glb(box(0.1, 0.1, 0.1), stride=24)
+    strip = box_glb(box(0.1, 0.1, 0.1))
+    strip.primitive["mode"] = 5
+    unit = box_glb(box(1, 1, 1), "u2", normalized=True)
+    unit.document["extensionsRequired"] = unit.document["extensionsUsed"] = ["KHR_mesh_quantization"]
+    unit.document["nodes"][0]["rotation"] = [0.0, 0.6, 0.0, 0.8]
+    return [each.bytes() for each in (box_glb(box(0.1, 0.1, 0.1)), sparse, copies, apart, strip, unit)]
+
+
+def _first_motive() -> bytes:
+    """The list of frames of Motive 1.0 and Tracking Tools."""
+    frames = [f"frame,{k},{k / 120:.6f},1,7,{'0.5,' * 6}1.0,0,0,0" for k in range(4)]
+    return (
+        "\n".join(["comment,made up", "righthanded", "info,version,1.1", "rigidbody,Box,7,4", *frames]).encode() + b"\n"
+    )
 
 
 _PICKLES = [pickle.dumps({"fps": 20, "size": [0.1, 2.5, None]}, protocol) for protocol in range(6)]
 
+_MOTIVE = [
+    _csv(),
+    _csv(";"),
+    _csv("\t"),
+    _csv(labels=False),
+    _csv().decode().encode("utf-16"),
+    _csv().replace(b"Rigid Body", b"Bone").replace(b"Box", b"Ann:LHand"),
+    _csv().replace(b"1.23", b"1.25").replace(b"Meters", b"Millimeters"),
+    _first_motive(),
+]
 FILE_TARGETS = {
     "bvh": FileTarget(read_bvh, [_bvh(), b"\xef\xbb\xbf" + _bvh("1e-3 0 0")], BvhError, _place("take.bvh")),
-    "motive": FileTarget(read_motive_csv, [_csv(), _csv(";"), _csv(labels=False)], MotiveCsvError, _place("take.csv")),
+    "motive": FileTarget(read_motive_csv, _MOTIVE, MotiveCsvError, _place("take.csv")),
     "glb": FileTarget(read_glb, _glbs(), GlbError),
     "pickle": FileTarget(plain_values, _PICKLES, ValueError),
 }

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from manipnet.inputs.sender_stats import CLOCK_S, MOST, RATE_S, SenderStats
-from manipnet.wire.bodies import BodyFrame
+from manipnet.wire.bodies import BodyFrame, BodySample
 
 
 def frames(rate_hz, seconds, offset_s=100.0, way_s=0.0, start_s=0.0, source="osc:a"):
@@ -35,6 +35,19 @@ def test_every_frame_is_passed_on_and_counted(senders, passed):
     assert said["rate_hz"] == pytest.approx(120.0)
     assert said["age_s"] == pytest.approx(1 / 120)
     assert senders.report(3.0 + 3 * RATE_S)["osc:a"]["rate_hz"] == 0.0
+
+
+@pytest.mark.parametrize("seconds", [0.7, 1.5, 3.0])
+@pytest.mark.parametrize("rate_hz", [10, 90, 120])
+def test_the_rate_of_each_body_is_known(senders, rate_hz, seconds):
+    slow = BodySample(2, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True)
+    for n, frame in enumerate(frames(rate_hz, seconds)):
+        fast = BodySample(1, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), n % 2 == 0)
+        senders(BodyFrame(frame.t_s, n, (fast, slow) if n % 2 == 0 else (fast,), frame.t_received_s, frame.source))
+    first, second = senders.report(seconds)["osc:a"]["bodies"]
+    assert first["rate_hz"] == pytest.approx(rate_hz)
+    assert second["rate_hz"] == pytest.approx(0.5 * rate_hz)
+    assert first["tracked"] == pytest.approx(0.5, abs=0.5 / rate_hz + 0.1)
 
 
 def test_the_fastest_frame_gives_the_clock_offset(senders):

@@ -1,16 +1,18 @@
 """The live page: in a real browser, towards strangers, and when its process dies."""
 
 import http.client
+import itertools
 import os
 import shutil
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 from browser import Page, browsing
-from live_server import LiveServer, serving
+from live_server import LiveServer, Sender, scene, serving
 
 from manipnet.page.web_server import may_act, may_look
 
@@ -71,6 +73,27 @@ def test_the_page_shows_hands_swaps_an_object_and_complains_of_nothing(demo: Liv
     counters = demo.ask({"op": "status"})["counters"]
     assert counters["page_frames"]["shown"] > 10
     assert "page_ended" not in counters
+
+
+def test_the_page_says_what_is_wrong_with_what_arrives_and_what_to_do(tiny_bundle: Path, tmp_path: Path) -> None:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("needs chromium: apt-get install chromium")
+    with (
+        serving("--mesh", "Box=cube", "--model", str(tiny_bundle)) as server,
+        browsing(chromium, server.addresses["page"], tmp_path / "profile") as page,
+    ):
+        page.wait_for(f"{TEXT}.includes('nothing arrives at all → is the sender running')", PATIENCE_S)
+        sender = Sender(server.addresses["bodies"])
+        poses = {"left_wrist": scene(0.0)["left_wrist"], "<b>Right</b>": scene(0.0)["right_wrist"]}
+        for k in itertools.count():
+            sender.send(k / 60, poses)
+            if page.evaluate(f"{TEXT}.includes(\"right_wrist: no body 'right_wrist' arrives → give the body\")"):
+                break
+            assert k < 60 * PATIENCE_S
+            time.sleep(1 / 60)
+        assert page.evaluate(f"{TEXT}.includes(\"name one of these in the rig: '<b>Right</b>'\")")
+        sender.close()
 
 
 def drop(page: Page, name: str, file: Path) -> None:

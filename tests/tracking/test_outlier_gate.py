@@ -157,6 +157,25 @@ def test_a_tracked_body_that_freezes_is_rejected_until_it_moves_again():
     assert set(faults(gate, moving(shaking(1.0, start_s=4.0)))) == {None}
 
 
+@pytest.mark.parametrize("noise_m", [1e-5, 3e-4])
+def test_a_body_that_freezes_while_it_moves_is_rejected(noise_m):
+    """Its noise shows across the motion."""
+    gate, shake = OutlierGate(), random.Random(1)
+    places = [
+        (0.5 * math.sin(3.0 * n / HZ), *(1.0 + shake.gauss(0.0, noise_m) for _ in range(2))) for n in range(2 * HZ)
+    ]
+    swing = [frame(n / HZ, ("wrist", place)) for n, place in enumerate(places)]
+    assert set(faults(gate, moving(swing))) == {None}
+    assert faults(gate, moving(still(2.0, places[-1], start_s=2.0)))[-1] == "frozen"
+
+
+def test_a_computed_motion_that_is_rounded_may_stand_still():
+    gate = OutlierGate()
+    places = [tuple(round(v, 6) for v in (math.sin(n / HZ), 1.0 + 1e-7 * math.sin(n), n / HZ)) for n in range(3 * HZ)]
+    swing = [frame(n / HZ, ("wrist", place)) for n, place in enumerate(places)]
+    assert set(faults(gate, moving([*swing, *still(2.0, places[-1], start_s=3.0)]))) == {None}
+
+
 def test_nothing_is_frozen_while_everything_stands_still():
     gate = OutlierGate()
     faults(gate, shaking(1.0))

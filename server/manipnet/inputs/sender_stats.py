@@ -44,8 +44,8 @@ class _Body:
         self.rate_hz, self.share = 0.0, 0.0
 
     def turn(self, now_s: float) -> None:
-        """End a period."""
-        self.rate_hz, self.share = self._rate(now_s), self.tracked / self.counted
+        """End a period with the arrival of a frame that is not counted yet."""
+        self.rate_hz, self.share = self.counted / (now_s - self.since_s), self.tracked / self.counted
         self.since_s, self.counted, self.tracked = now_s, 0, 0
 
     def report(self, id: int | None, name: str | None, now_s: float) -> dict[str, Any]:
@@ -54,14 +54,14 @@ class _Body:
         return {
             "id": id,
             "name": name,
-            "rate_hz": self._rate(self.heard_s) if is_young else self.rate_hz,
+            "rate_hz": self._rate_so_far() if is_young else self.rate_hz,
             "age_s": max(now_s - self.heard_s, 0.0),
             "tracked": self.tracked / self.counted if self.counted and is_young else self.share,
         }
 
-    def _rate(self, now_s: float) -> float:
-        passed_s = now_s - self.since_s
-        return (self.counted - (not self.rate_hz)) / passed_s if passed_s > 0.0 else 0.0
+    def _rate_so_far(self) -> float:
+        passed_s = self.heard_s - self.since_s
+        return (self.counted - 1) / passed_s if passed_s > 0.0 else 0.0
 
 
 @dataclass(slots=True)

@@ -8,6 +8,7 @@ import viser
 from manipnet.page.calibrate_tab import CalibrateTab
 from manipnet.page.charts import History, Plots
 from manipnet.page.controls import Action, Ask, by_visitor
+from manipnet.page.doctor_text import doctor_text
 from manipnet.page.frames import Frame
 from manipnet.page.markdown import escape
 from manipnet.page.objects_tab import ObjectsTab
@@ -46,6 +47,7 @@ class Panel:
         side = gui.add_panel()
         with side.add_tab("Health", viser.Icon.HEARTBEAT):
             self._health = gui.add_markdown("")
+            self._doctor = gui.add_markdown("")
             self._plots = Plots(gui)
         side.dock_left()
 
@@ -61,6 +63,7 @@ class Panel:
         status = self._ask(op="status")
         self._headline.content = _headline(self._show, status, history)
         self._health.content = _health(status)
+        self._doctor.content = doctor_text(status["doctor"])
         self._plots.show(history)
         if self.objects is not None and self._takes is not None and self._calibration is not None:
             self._show_paused(_paused(status))
@@ -139,7 +142,7 @@ def _warnings(status: dict[str, Any]) -> list[str]:
 def _activity(show: Show, status: dict[str, Any], history: History) -> str:
     frames = show.live.values()
     if not frames:
-        return "○ **Waiting for bodies.** Run `manipnet doctor` to find out why none arrive."
+        return "○ **Waiting for bodies.** *Health* says why none are used."
     latency = next(iter(frames)).message.latency_ms
     what = "◐ **Paused**" if _paused(status) else "● **Live**"
     if show.recording is not None:

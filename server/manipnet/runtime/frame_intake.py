@@ -15,6 +15,7 @@ _USED = ""
 _BEST_FIRST: Final = (_USED, "duplicate", "other_sender", "late", "time_jump", "internal", "unknown_body")
 """Outcomes of a frame. Of the outcomes at several actors, the first in this order counts."""
 
+MOST_SENDERS: Final = 64
 _log = logging.getLogger(__name__)
 
 
@@ -26,6 +27,8 @@ class FrameIntake:
     ) -> None:
         self._actors, self._recorder, self._errors, self._telemetry = actors, recorder, errors, telemetry
         self._gate = OutlierGate()
+        self._useful: set[str] = set()
+        """Senders of which a frame was used; the others are reported when none of their bodies is in the rig."""
 
     def push(self, frame: BodyFrame) -> None:
         """Take a frame as it was received."""
@@ -34,10 +37,18 @@ class FrameIntake:
         for fault in faults:
             self._telemetry.count("bodies_rejected", reason=fault)
         outcome = min([self._push(actor, frame) for actor in self._actors], key=_BEST_FIRST.index)
-        if outcome != _USED:
-            self._telemetry.count("frames_dropped", reason=outcome)
-        if outcome == "unknown_body":
+        if outcome == _USED:
+            self._note_useful(frame.source)
+            return
+        self._telemetry.count("frames_dropped", reason=outcome)
+        if outcome == "unknown_body" and frame.source not in self._useful:
             _log.warning("a frame from %s has no body of the rig: %s", frame.source, self._compare(frame))
+
+    def _note_useful(self, source: str) -> None:
+        if source not in self._useful:
+            if len(self._useful) >= MOST_SENDERS:
+                self._useful.clear()
+            self._useful.add(source)
 
     def _push(self, actor: Actor, frame: BodyFrame) -> str:
         try:

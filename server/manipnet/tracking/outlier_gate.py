@@ -25,10 +25,10 @@ SWAP_RATIO: Final = 0.25
 """Two bodies were swapped if both moved faster than this and each is now near the other's old place: nearer than this
 share of the distance between the two places.
 """
-NOISE_M: Final = 1e-3
+NOISE_M: Final = (2e-6, 1e-3)
 NOISE_TURNS: Final = 20
 """Noise reverses direction at most small steps; real motion does not. A body that has shown this many more small steps
-back than forth has noise, so it can never be perfectly still.
+back than forth along one axis has noise, so it can never be perfectly still. Smaller steps may be those of rounding.
 """
 FROZEN_S: Final = 0.5
 MOVING_S: Final = 0.1
@@ -48,7 +48,9 @@ class _History:
     jumped_s: float = 0.0
     candidate: tuple[float, BodySample] | None = None
     step: Vector = (0.0, 0.0, 0.0)
-    noise_turns: int = 0
+    noise_turns: list[int] = field(default_factory=lambda: [0, 0, 0])
+    """By axis, how many more small steps were back than forth."""
+    has_noise: bool = False
     changed_s: float = field(default=-math.inf)
 
 
@@ -156,17 +158,21 @@ def _is_still(history: _History, t_s: float, body: BodySample) -> bool:
     A body without noise is computed, not tracked, such as a recorded prop on a table; it may be still.
     """
     if body.p == history.sample.p and body.q == history.sample.q:
-        return history.noise_turns >= NOISE_TURNS and t_s - history.changed_s > FROZEN_S
-    step = (
-        body.p[0] - history.sample.p[0],
-        body.p[1] - history.sample.p[1],
-        body.p[2] - history.sample.p[2],
-    )
-    turned = sum(a * b for a, b in zip(step, history.step, strict=True)) < 0.0
-    if history.noise_turns < NOISE_TURNS and math.hypot(*step) < NOISE_M:
-        history.noise_turns = history.noise_turns + 1 if turned else max(history.noise_turns - 1, 0)
-    history.step, history.changed_s = step, t_s
+        return history.has_noise and t_s - history.changed_s > FROZEN_S
+    if not history.has_noise:
+        _learn_noise(history, body)
+    history.changed_s = t_s
     return False
+
+
+def _learn_noise(history: _History, body: BodySample) -> None:
+    (x, y, z), (known_x, known_y, known_z) = body.p, history.sample.p
+    step, turns = (x - known_x, y - known_y, z - known_z), history.noise_turns
+    for axis, (one, before) in enumerate(zip(step, history.step, strict=True)):
+        if NOISE_M[0] < abs(one) < NOISE_M[1]:
+            turns[axis] = turns[axis] + 1 if one * before < 0.0 else max(turns[axis] - 1, 0)
+    history.has_noise = max(turns) >= NOISE_TURNS
+    history.step = step
 
 
 def _angle(one: BodySample, other: BodySample) -> float:

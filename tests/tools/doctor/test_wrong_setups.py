@@ -224,6 +224,22 @@ SETUPS = {
         "body 1 is not used, because its rotation never arrives",
         "let the sender send the rotation too",
     ),
+    "an avatar without trackers": (
+        over_osc,
+        [
+            lambda k: [
+                bundle(osc("/VMC/Ext/OK", 1), osc("/VMC/Ext/Bone/Pos", "LeftHand", *bodies(k)[0][1])),
+            ]
+        ],
+        "sends /VMC/Ext/Bone/Pos 1",
+        "let the sender send its trackers too: /VMC/Ext/Tra/Pos",
+    ),
+    "a bridge without bodies": (
+        over_osc,
+        [lambda k: [*bridge(k)[:2], osc("/frame/end", 9000 + k)]],
+        "sends messages that are understood, but no pose of a body",
+        "turn on rigid bodies, trackers or bones",
+    ),
     "two bodies with one id over OSC": (
         over_osc,
         [lambda k: [vmc(k, extra=[osc("/VMC/Ext/Tra/Pos", "3", 2.0, 1.0, 2.0 + 1e-3 * k, 0.0, 0.0, 0.0, 1.0)])]],
@@ -369,6 +385,12 @@ SETUPS = {
         "left_wrist: no body 1 arrives",
         "name one of these in the rig: 'Ann:LHand', 'Ann:RHand'",
     ),
+    "a Motive with a skeleton that it does not name": (
+        lambda ports: motive(ports, lambda k: Frame(bodies=[], skeletons={5: [Body(9), Body(13)]}), names={}),
+        [],
+        "Motive streams skeletons whose bones have no names, and no rigid bodies",
+        "enable Skeletons in Motive's streaming settings",
+    ),
     "a Motive without bodies": (
         lambda ports: motive(ports, lambda k: Frame(bodies=[], skeletons={}), names={}),
         [],
@@ -411,6 +433,22 @@ def test_a_good_setup_has_no_problem(ports, rig, capsys):
         )
 
 
+def test_trackers_in_bundles_of_their_own_are_not_too_many_frames(ports, rig, capsys):
+    def frame(k):
+        trackers = [*bodies(k), *((i, bodies(k)[0][1]) for i in range(4, 9))]
+        return [bundle(osc("/VMC/Ext/T", k / HZ), osc("/VMC/Ext/Tra/Pos", str(i), *p)) for i, p in trackers]
+
+    with over_osc(ports, frame):
+        assert doctor.main([*ports.options, f"--rig={rig}", f"--seconds={SECONDS}"]) == 0, capsys.readouterr().out
+
+
+def test_a_sender_that_was_started_again_is_in_order(ports, rig, capsys):
+    """The one before has another port, and its bodies come from the new one."""
+    with over_osc(ports, lambda k: [vmc(k)] if k < HZ else [], lambda k: [vmc(k)] if k > 1.3 * HZ else []):
+        assert doctor.main([*ports.options, f"--rig={rig}", "--seconds=4"]) == 0
+    assert re.search(r"note    other senders now send the bodies of osc:\S+, which stopped", capsys.readouterr().out)
+
+
 # The server that runs says the same
 
 
@@ -421,6 +459,8 @@ AGREEING = (
     "a body that is never tracked",
     "two programs that send the same",
     "positions without rotations",
+    "an avatar without trackers",
+    "a bridge without bodies",
     "two bodies with one id over OSC",
     "a time that stands still, and no other",
     "a pose of NaN",

@@ -71,7 +71,9 @@ def take_frames(take: Take) -> Iterator[BodyFrame]:
             BodySample(None, name, tuple(poses[k][:3]), tuple(poses[k][3:]), tracked[k])
             for name, (poses, tracked) in tracks.items()
         ]
-        yield BodyFrame(t_s, k, tuple(bodies), t_s, f"take:{take.name}")
+        timecode = None if take.timecode is None else take.timecode.texts[k] or None
+        rate = None if take.timecode is None else take.timecode.rate
+        yield BodyFrame(t_s, k, tuple(bodies), t_s, f"take:{take.name}", timecode, rate)
 
 
 def resample(take: Take, rate_hz: float) -> Take:
@@ -88,7 +90,8 @@ def resample(take: Take, rate_hz: float) -> Take:
     gap_s = np.where(after > before, take.time_s[after] - take.time_s[before], 1.0)
     share = np.clip((time_s - take.time_s[before]) / gap_s, 0.0, 1.0)
     bodies = {name: _between(track, before, after, share) for name, track in take.bodies.items()}
-    return Take(take.name, rate_hz, time_s, bodies)
+    timecode = None if take.timecode is None else take.timecode.at(take.time_s, time_s)
+    return Take(take.name, rate_hz, time_s, bodies, timecode=timecode)
 
 
 def _between(track: BodyTrack, before: NDArray[np.intp], after: NDArray[np.intp], share: Array) -> BodyTrack:

@@ -40,7 +40,7 @@ def run(options: SynthesizeOptions) -> None:
 
 
 def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands: dict[str, Array]) -> None:
-    """Write the result: `time`, the arrays of `synthesise`, and the poses and mesh of every object."""
+    """Write the result: `time`, the timecode, the arrays of `synthesise`, and the poses and mesh of every object."""
     objects = [name for name in ticks.bodies if not name.endswith("_wrist")]
     arrays: dict[str, Any] = {"time": ticks.time_s, **hands, "objects": np.array(objects)}
     arrays["object_poses"] = np.stack([ticks.bodies[name].poses for name in objects])
@@ -48,6 +48,8 @@ def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands:
         if name in shapes:
             arrays[f"object_{k}_vertices"] = shapes[name].mesh.vertices.astype(np.float32)
             arrays[f"object_{k}_faces"] = shapes[name].mesh.faces
+    if ticks.timecode is not None:
+        arrays |= ticks.timecode.arrays()
     np.savez_compressed(file, **arrays)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def read_fingers(path: Path, case: Case) -> Hands:
     try:
         with np.load(path, allow_pickle=False) as arrays:
             time_s, *world = (arrays[name] for name in wanted)
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, BadZipFile) as error:
         raise DataError(f"{path}: is not a file of manipnet synthesize ({error})") from None
     index = np.searchsorted(time_s, case.ticks.time_s - 0.5 / TICK_HZ)
     if index[-1] >= len(time_s) or np.abs(time_s[index] - case.ticks.time_s).max() > 0.5 / TICK_HZ:

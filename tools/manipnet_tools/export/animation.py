@@ -16,6 +16,7 @@ from manipnet.tracking.tick import TICK_HZ
 from manipnet.wire import SIDES, HandsMessage
 from manipnet_tools.takes.meshes import recorded_meshes
 from manipnet_tools.takes.take import BodyTrack, last_tracked, read_take
+from manipnet_tools.takes.timecode_track import TimecodeTrack, timecode_of
 
 PAUSE_S = 10.0
 """A recording is split where its sender's time jumps back, or forward by more than this."""
@@ -67,6 +68,8 @@ class Animation:
     objects: dict[str, BodyTrack] = field(default_factory=dict)
     meshes: dict[str, ClosedMesh] = field(default_factory=dict)
     """The meshes of the objects whose shape is known."""
+    timecode: TimecodeTrack | None = None
+    """If the tracker sent one."""
 
 
 def read_animation(path: Path, model: Hand, actor: str | None = None) -> Animation:
@@ -127,7 +130,7 @@ def _read_synthesised(path: Path, model: Hand) -> Animation:
         objects[name] = BodyTrack(arrays["object_poses"][k], seen)
         if f"object_{k}_faces" in arrays:
             meshes[name] = closed_mesh(arrays[f"object_{k}_vertices"], arrays[f"object_{k}_faces"], name)
-    return Animation(path.stem, TICK_HZ, time_s, hands, objects, meshes)
+    return Animation(path.stem, TICK_HZ, time_s, hands, objects, meshes, timecode_of(arrays))
 
 
 def _read_recording(path: Path, model: Hand, actor: str | None) -> Animation:
@@ -149,7 +152,8 @@ def _read_recording(path: Path, model: Hand, actor: str | None) -> Animation:
     names = dict.fromkeys(body.name for message in run for body in message.bodies if not body.name.endswith("_wrist"))
     objects = {name: _recorded_body(frames, name) for name in names}
     meshes = {name: mesh for name, mesh in recorded_meshes(path).items() if name in objects}
-    return Animation(path.stem, TICK_HZ, np.arange(len(frames)) / TICK_HZ, hands, objects, meshes)
+    timecode = TimecodeTrack.of((None, None) if m is None else (m.timecode, m.timecode_rate) for m in frames)
+    return Animation(path.stem, TICK_HZ, np.arange(len(frames)) / TICK_HZ, hands, objects, meshes, timecode)
 
 
 def _longest_run(messages: list[HandsMessage]) -> list[HandsMessage]:

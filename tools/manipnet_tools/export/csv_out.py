@@ -21,11 +21,14 @@ def write_csv(animation: Animation, path: Path) -> None:
     for name, body in animation.objects.items():
         columns |= {f"{name}_{part}": body.poses[:, k] for k, part in enumerate(_POSE)}
         columns[f"{name}_tracked"] = body.tracked.astype(np.float64)
+    timecode = animation.timecode
+    rate = "" if timecode is None or timecode.rate is None else f"{timecode.rate:.8g}"
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["frame", *columns])
-        table = np.column_stack(list(columns.values())).tolist()
-        writer.writerows([k, *(f"{value:.8g}" for value in row)] for k, row in enumerate(table))
+        writer.writerow(["frame", *columns, *(("timecode", "timecode_rate") if timecode is not None else ())])
+        for k, row in enumerate(np.column_stack(list(columns.values())).tolist()):
+            cells = [k, *(f"{value:.8g}" for value in row)]
+            writer.writerow(cells if timecode is None else [*cells, timecode.texts[k], rate])
 
 
 def _hand_columns(side: Side, hand: HandTrack) -> dict[str, Array]:

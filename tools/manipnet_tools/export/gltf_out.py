@@ -20,6 +20,7 @@ from manipnet.wire import Side
 from manipnet_tools.export.animation import Animation, HandTrack
 from manipnet_tools.export.glb import ATTRIBUTE, INDEX, Buffer
 from manipnet_tools.rendering import CERAMIC, SKIN_LEFT, SKIN_RIGHT, corner_normals
+from manipnet_tools.takes.timecode_track import TimecodeTrack
 
 _COLOURS: Mapping[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right": SKIN_RIGHT}
 
@@ -45,8 +46,9 @@ class _Document:
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
         self._name = animation.name
-        time_s = (animation.time_s - animation.time_s[0]).astype(np.float32)
-        self._times = self._buffer.add(time_s, bounds=True)
+        time_s = animation.time_s - animation.time_s[0]
+        self._timecode = _timecode(animation.timecode, time_s)
+        self._times = self._buffer.add(time_s.astype(np.float32), bounds=True)
 
     def add_hand(self, side: Side, hand: HandTrack) -> None:
         """Add the skeleton of a hand, with its fingertips, and the skin that follows it."""
@@ -78,7 +80,7 @@ class _Document:
     def save(self, path: Path) -> None:
         """Write the document."""
         optional = {key: value for key, value in (self._document | {"skins": self._skins}).items() if value}
-        animation = {"name": self._name, "channels": self._channels, "samplers": self._samplers}
+        animation = {"name": self._name, "channels": self._channels, "samplers": self._samplers, **self._timecode}
         asset = {"version": "2.0", "generator": f"ManipNet Live {__version__}"}
         scenes = [{"name": self._name, "nodes": self._roots}]
         self._buffer.save(path, {"asset": asset, "scene": 0, "scenes": scenes, "animations": [animation], **optional})
@@ -152,6 +154,15 @@ class _Document:
         material = {"material": len(self._document["materials"]) - 1}
         self._document["meshes"].append({"name": name, "primitives": [primitive | material]})
         return len(self._document["meshes"]) - 1
+
+
+def _timecode(timecode: TimecodeTrack | None, time_s: Array) -> dict[str, Any]:
+    """The application-specific data of the animation: its first timecode, when that is, and its rate."""
+    first = None if timecode is None else next((k for k, text in enumerate(timecode.texts) if text), None)
+    if timecode is None or first is None:
+        return {}
+    about = {"timecode": timecode.texts[first], "timecode_time_s": float(time_s[first])}
+    return {"extras": about | ({} if timecode.rate is None else {"timecode_rate": timecode.rate})}
 
 
 def split_creases(vertices: Array, faces: NDArray[np.integer[Any]]) -> tuple[Array, Array, NDArray[np.integer[Any]]]:

@@ -25,6 +25,8 @@ _COLUMN: Final = re.compile(
 )
 _TIMES: Final = ("time", "t", "timestamp", "time_s", "time (seconds)", "seconds")
 _POSE: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
+LARGEST: Final = 1e12
+"""A cell with a number as large as this holds no measurement."""
 RATES_HZ: Final = (10.0, 1000.0)
 
 
@@ -117,9 +119,10 @@ def _numbers(lines: list[list[str]], width: int, decimal_commas: bool, path: Pat
 
 def _number(cell: str, decimal_commas: bool) -> float:
     try:
-        return float(cell.replace(",", ".") if decimal_commas else cell)
+        value = float(cell.replace(",", ".") if decimal_commas else cell)
     except ValueError:
         return np.nan
+    return value if abs(value) < LARGEST else np.nan
 
 
 def _at_one_rate(columns: list[str], numbers: Array, path: Path) -> tuple[float, Array]:

@@ -82,9 +82,9 @@ def _session(file: Path) -> tuple[dict[str, Array], dict[str, Any]]:
             arrays = {name: data[name] for name in _NEEDED[1:]}
         with zipfile.ZipFile(file) as archive:
             about = _metadata(archive.read("metadata.npy"))
-    except (OSError, ValueError, zipfile.BadZipFile, EOFError, KeyError) as error:
-        if isinstance(error, ImportingError):
-            raise
+    except ImportingError:
+        raise
+    except Exception as error:  # NumPy raises errors of any type for a damaged file
         raise ImportingError(f"{file}: cannot be read ({error}); copy it again") from None
     if any(array.ndim != 2 or array.shape[1] != width for array, width in zip(arrays.values(), (3, 4), strict=True)):
         raise ImportingError(f"{file}: the poses of the object are not (T, 3) and (T, 4); copy it again")

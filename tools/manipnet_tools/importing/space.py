@@ -54,6 +54,9 @@ def _unit(hands: dict[Side, Array], hand: Hand) -> str:
     """The unit in which the middle fingers, from the wrist on, are as long as those of people."""
     flat = forward_kinematics(hand, np.zeros(hand.angle_count))[0][model_joints(hand)]
     model = _length(flat[np.newaxis, list(_MIDDLE)])
+    for side, joints in hands.items():
+        if not np.isfinite(joints[:, _MIDDLE]).all(axis=(1, 2)).any():
+            raise ImportingError(f"the {side} hand has no frame with its wrist and its whole middle finger")
     lengths = [_length(joints[:, _MIDDLE]) for joints in hands.values()]
     ratios = {unit: float(np.median(lengths)) * metres / model for unit, metres in UNITS_M.items()}
     unit = min(ratios, key=lambda unit: abs(np.log(max(ratios[unit], 1e-9))))

@@ -27,6 +27,7 @@ ORIGIN: Final = Origin(
     "https://taco2024.github.io",
 )
 RATE_HZ: Final = 30.0
+FARTHEST_M: Final = 1e4
 _JOINTS: Final = "hand_joints.npy"
 _MODEL_FOLDERS: Final = ("Object_Models", "object_models_released", "Object_Models/object_models_released")
 _Y_UP: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -59,7 +60,7 @@ def _read(name: str, file: Path, objects: Path) -> SourceTake:
     if not poses:
         raise ImportingError(f"{objects}: holds no tool_<id>.npy or target_<id>.npy; unpack Object_Poses.zip of TACO")
     frames = min(len(joints), *map(len, poses.values()))
-    turned = joints[:frames].astype(np.float64) @ _Y_UP.T
+    turned = joints[:frames] @ _Y_UP.T
     return SourceTake(
         name.rpartition("/")[2],
         RATE_HZ,
@@ -70,9 +71,10 @@ def _read(name: str, file: Path, objects: Path) -> SourceTake:
 
 def _poses(matrices: Array) -> Array:
     """Poses `(T, 7)` with Y up from matrices `(T, 4, 4)` with Z up; NaN where a matrix is not a rigid pose."""
-    rotations, places = _Y_UP @ matrices[:, :3, :3].astype(np.float64), matrices[:, :3, 3] @ _Y_UP.T
+    rotations, places = _Y_UP @ matrices[:, :3, :3], matrices[:, :3, 3] @ _Y_UP.T
     right = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
-    right[right] = np.abs(np.linalg.det(rotations[right]) - 1.0) < 0.05
+    with np.errstate(all="ignore"):
+        right[right] = np.abs(np.linalg.det(rotations[right]) - 1.0) < 0.05
     poses = np.full((len(matrices), 7), np.nan)
     poses[right] = np.concatenate([places[right], matrix_to_quat(rotations[right])], axis=1)
     return poses
@@ -87,12 +89,15 @@ def _mesh(name: str, folder: Path) -> ClosedMesh:
 
 
 def _array(file: Path, shape: tuple[int, ...]) -> Array:
-    """An array `(T, *shape)` in a file. Raises `ImportingError`."""
+    """An array `(T, *shape)` in a file, with NaN for numbers that cannot be lengths. Raises `ImportingError`."""
     try:
         array = np.load(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
+    except Exception as error:  # NumPy raises errors of any type for a damaged file
         raise ImportingError(f"{file}: cannot be read ({error}); copy it again") from None
     if array.shape[1:] != shape or not len(array) or array.dtype.kind != "f":
         expected = ", ".join(map(str, shape))
         raise ImportingError(f"{file}: holds {array.dtype} {array.shape}; expected are decimal numbers (T, {expected})")
+    with np.errstate(invalid="ignore"):  # some kinds of NaN
+        array = array.astype(np.float64)
+    array[~(np.abs(array) < FARTHEST_M)] = np.nan
     return array

@@ -9,7 +9,7 @@ import csv
 
 import numpy as np
 
-from manipnet_tools.takes.motive_table import Columns, MotiveCsvError, Table
+from manipnet_tools.takes.motive_table import LARGEST, Columns, MotiveCsvError, Table
 
 _BODY_CELLS = 11
 _QUATERNION, _POSITION = "XYZW", "XYZ"
@@ -50,11 +50,20 @@ def _frame(line: list[str]) -> tuple[float, float, dict[str, list[float]]]:
     """Number, seconds, and of each tracked body the quaternion and the position, by its ID."""
     bodies = {}
     for start in range(4, 4 + _BODY_CELLS * int(line[3]), _BODY_CELLS):
-        cells = line[start : start + 8]
+        identity, *cells = line[start : start + 8]
+        if len(cells) < 7:
+            raise ValueError(f"it announces {line[3].strip()} bodies but ends in the middle of one")
         if not any("#" in cell for cell in cells):
-            x, y, z, *turn = (float(cell) for cell in cells[1:])
-            bodies[cells[0].strip()] = [*turn, x, y, z]
-    return float(line[1]), float(line[2]), bodies
+            x, y, z, *turn = (_number(cell) for cell in cells)
+            bodies[identity.strip()] = [*turn, x, y, z]
+    return _number(line[1]), _number(line[2]), bodies
+
+
+def _number(cell: str) -> float:
+    value = float(cell)
+    if not abs(value) < LARGEST:
+        raise ValueError(f"{cell.strip()!r} is not a number")
+    return value
 
 
 def _columns(first: int) -> Columns:

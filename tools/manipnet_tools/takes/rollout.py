@@ -18,6 +18,7 @@ from manipnet.synthesis.synthesizer import HandScene, HandStep, Synthesizer
 from manipnet.tracking.tick import BodyAtTick, Tick
 from manipnet.tracking.timeline import Timeline
 from manipnet_tools.takes.take import Take, TakeError
+from manipnet_tools.takes.timecode_track import TimecodeTrack
 
 _log = logging.getLogger(__name__)
 OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
@@ -48,9 +49,11 @@ class Ticks:
 
     time_s: Array
     bodies: dict[str, BodyTicks]
+    timecode: TimecodeTrack | None = None
 
     def __getitem__(self, ticks: slice) -> "Ticks":
-        return Ticks(self.time_s[ticks], {name: body[ticks] for name, body in self.bodies.items()})
+        timecode = None if self.timecode is None else self.timecode[ticks]
+        return Ticks(self.time_s[ticks], {name: body[ticks] for name, body in self.bodies.items()}, timecode)
 
 
 @dataclass(frozen=True)
@@ -115,8 +118,9 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
     whole = [t for t in ticks if t.time_s - ticks[0].time_s >= MAX_LOOK_AHEAD_S and names <= t.bodies.keys()]
     if not whole:
         raise TakeError(_too_little(take, ticks))
+    time_s = np.array([t.time_s for t in whole])
     return Ticks(
-        np.array([t.time_s for t in whole]) - float(take.time_s[0]),
+        time_s - float(take.time_s[0]),
         {
             name: BodyTicks(
                 np.stack([t.bodies[name].window for t in whole]),
@@ -125,6 +129,7 @@ def tick_take(take: Take, look_ahead_s: float = MAX_LOOK_AHEAD_S) -> Ticks:
             )
             for name in names
         },
+        None if take.timecode is None else take.timecode.at(take.time_s, time_s),
     )
 
 

@@ -20,6 +20,7 @@ from manipnet_tools.takes.bvh_folder import read_bvh_folder
 from manipnet_tools.takes.bvh_motion import BvhError
 from manipnet_tools.takes.motive_csv import read_motive_csv
 from manipnet_tools.takes.motive_table import MotiveCsvError
+from manipnet_tools.takes.timecode_track import TimecodeTrack
 from manipnet_tools.takes.trajectory import TrajectoryError, read_trajectory
 
 TRACKED_FORMATS: Final = (".csv", ".mcap")
@@ -59,6 +60,8 @@ class Take:
     fingers: dict[str, Fingers] = field(default_factory=dict)
     box_centred: bool = False
     """Objects are where the centres of their bounding boxes are, not where their meshes' origins are."""
+    timecode: TimecodeTrack | None = None
+    """If the tracker sent one."""
 
     @property
     def objects(self) -> tuple[str, ...]:
@@ -157,7 +160,9 @@ def _read_recording(path: Path) -> Take:
         raise TakeError(f"{path}: holds no run of body frames")
     frames = [longest[t_s] for t_s in sorted(longest)]
     time_s = np.array([frame.t_s for frame in frames])
-    return Take(path.stem, round(1.0 / float(np.median(np.diff(time_s))), 3), time_s - time_s[0], _tracks(frames))
+    rate_hz = round(1.0 / float(np.median(np.diff(time_s))), 3)
+    timecode = TimecodeTrack.of((frame.timecode, frame.timecode_rate) for frame in frames)
+    return Take(path.stem, rate_hz, time_s - time_s[0], _tracks(frames), timecode=timecode)
 
 
 def _tracks(frames: Sequence[BodyFrame]) -> dict[str, BodyTrack]:

@@ -26,8 +26,8 @@ from manipnet.inputs.natnet.protocol import (
     read_server_info,
     write_packet,
 )
-from manipnet.inputs.natnet.timecode_rate import TimecodeRate
 from manipnet.inputs.sender_clock import SenderClock
+from manipnet.inputs.timecode_rate import TimecodeRate
 from manipnet.net.addresses import AllowList
 from manipnet.net.clock_offset import ClockProbes
 from manipnet.net.errors import ListenError

@@ -3,9 +3,9 @@
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from manipnet.inputs.osc.ignored import IgnoredAddresses
+from manipnet.inputs.osc.ignored import IgnoredAddress, IgnoredAddresses
 from manipnet.inputs.osc.packet import Argument, check_address, read_address, read_arguments
-from manipnet.inputs.osc.patterns import PATTERNS, SILENT, Pattern, with_axes
+from manipnet.inputs.osc.patterns import PATTERNS, WITHOUT_BODY, Pattern, with_axes
 from manipnet.inputs.osc.reader import BodyKey, Reader, Route
 from manipnet.wire.bodies import MessageError, check_name
 
@@ -13,8 +13,8 @@ MOST_CACHED: Final = 2048
 """Addresses whose meaning is remembered. There are more only if a sender makes addresses up."""
 MOST_SKELETONS: Final = 64
 
-_Found = tuple[Reader, ...] | MessageError | None
-"""The readers of an address, none if it is not understood; what is wrong with it; None if it holds nothing of use."""
+_Found = tuple[Reader, ...] | MessageError | IgnoredAddress
+"""The readers of an address, none if it is not understood; what is wrong with it; or its count if it holds no body."""
 
 
 class AddressBook:
@@ -33,6 +33,8 @@ class AddressBook:
         self._skeletons: dict[int, str] = {}
         self.ignored = IgnoredAddresses()
         """The messages that were not understood."""
+        self.without_body = IgnoredAddresses()
+        """The messages that are known to hold nothing about tracked bodies."""
 
     def read(self, message: bytes, source: str = "", now_s: float = 0.0) -> Route | None:
         """The content of one OSC message, or None if it holds nothing of use. Raises `MessageError`.
@@ -41,10 +43,11 @@ class AddressBook:
         """
         raw, offset = read_address(message)
         readers = self._cache[raw] if raw in self._cache else self._find(raw)
-        if readers is None:
+        if not isinstance(readers, tuple):
+            if isinstance(readers, MessageError):
+                raise readers
+            readers.note(source, now_s)
             return None
-        if isinstance(readers, MessageError):
-            raise readers
         if not readers:
             self.ignored.note(raw, "", source, now_s)
             return None
@@ -79,8 +82,8 @@ class AddressBook:
             address = check_address(raw, self.bodies)
         except MessageError:
             return ()  # an address that breaks the rules belongs to somebody else
-        if address in SILENT:
-            return None
+        if address in WITHOUT_BODY:
+            return self.without_body.entry(raw)
         found = [(pattern, regex.fullmatch(address)) for pattern, regex in self._patterns]
         try:
             return tuple([Reader(p, match, self._key_of(p)) for p, match in found if match is not None])

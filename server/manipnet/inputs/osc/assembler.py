@@ -10,6 +10,7 @@ from manipnet.inputs.osc.memory import REFUSED, BodyMemory, Fields
 from manipnet.inputs.osc.packet import IMMEDIATELY, Packet, time_tag_to_s
 from manipnet.inputs.osc.reader import BodyKey, Route
 from manipnet.inputs.sender_clock import SenderClock
+from manipnet.inputs.timecode_rate import TimecodeRate
 from manipnet.wire.bodies import MAX_BODIES, BodyFrame, BodySample, MessageError
 from manipnet.wire.timecode import timecode_text
 
@@ -79,6 +80,7 @@ class FrameAssembler:
         self._vmc = _VmcTime()
         self._without_clock = 0
         self._bodies: tuple[BodySample, ...] = ()
+        self._timecode_rate = TimecodeRate()
 
     @property
     def pending(self) -> bool:
@@ -200,9 +202,9 @@ class FrameAssembler:
         if t_s is None:
             self.incomplete += 1
         else:
-            frames.append(
-                BodyFrame(t_s, pending.number, bodies, pending.touched_s, self.source, timecode=pending.timecode)
-            )
+            timecode = pending.timecode
+            rate = None if timecode is None else self._timecode_rate.note(timecode)
+            frames.append(BodyFrame(t_s, pending.number, bodies, pending.touched_s, self.source, timecode, rate))
 
     def _time(self, pending: _Pending, bodies: tuple[BodySample, ...]) -> float | None:
         tag_s = None if pending.time_tag <= IMMEDIATELY else time_tag_to_s(pending.time_tag)

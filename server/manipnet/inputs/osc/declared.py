@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from manipnet.common.options import ConfigError, Kind, shorten
-from manipnet.inputs.osc.patterns import COMPONENTS, FRAME, KEYS, Pattern
+from manipnet.inputs.osc.patterns import COMPONENTS, EULER, FRAME, KEYS, Pattern
 from manipnet.inputs.osc.space import ROTATION_ORDERS, Space, read_axes
 from manipnet.synthesis.objects.units import UNITS_M
 
@@ -64,13 +64,25 @@ def read_pattern(table: Mapping[str, Any]) -> Pattern:
     words = arguments.split()
     _check_words(address, words)
     body = table.get("body", "")
-    is_about_frame = any(word in FRAME for word in words)
-    if not body and not is_about_frame and "body" not in words and "<body>" not in address and "bone" not in words:
+    _check_keys(address, words, body)
+    return Pattern(address, " ".join(words), _space(address, table, not {*EULER}.isdisjoint(words)), body=body)
+
+
+def _check_keys(address: str, words: list[str], body: str) -> None:
+    """Raise `ConfigError` unless address, arguments and `body` say once which body a message is about."""
+    counts = {key: address.count(f"<{key}>") + (key in words) for key in KEYS}
+    counts["body"] += bool(body)
+    if twice := [key for key, count in counts.items() if count > 1]:
+        raise ConfigError(f"says more than once which {twice[0]} {address} is about")
+    if counts["body"] and (counts["skeleton"] or counts["bone"]):
+        raise ConfigError(f"names both a body and a bone of a skeleton for {address}; name one of the two")
+    if counts["bone"] and not counts["skeleton"]:
+        raise ConfigError(f"names a bone for {address}, but no skeleton; put <skeleton> into the address too")
+    if not any(counts.values()) and not any(word in FRAME for word in words):
         raise ConfigError(
             f"does not say which body {address} is about: put <body> into the address, body into the arguments, or "
             "give body = 'NAME'"
         )
-    return Pattern(address, " ".join(words), _space(address, table, "rx" in words or "ry" in words), body=body)
 
 
 def _check_words(address: str, words: list[str]) -> None:
@@ -98,7 +110,9 @@ def _space(address: str, table: Mapping[str, Any], has_angles: bool) -> Space:
         raise ConfigError(f"has the unit {unit!r} for {address}; allowed are {', '.join(UNITS_M)}")
     if angles not in ANGLES:
         raise ConfigError(f"has angles = {angles!r} for {address}; allowed are {', '.join(ANGLES)}")
-    if has_angles and order not in ROTATION_ORDERS:
+    if order and order not in ROTATION_ORDERS:
+        raise ConfigError(f"has rotation_order = {order!r} for {address}; allowed are {', '.join(ROTATION_ORDERS)}")
+    if has_angles and not order:
         raise ConfigError(
             f"needs rotation_order for the angles of {address}, the fixed axes about which they turn, the first turn "
             f"first: {', '.join(ROTATION_ORDERS)}; Unity and VRChat use zxy"

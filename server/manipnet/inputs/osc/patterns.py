@@ -123,7 +123,7 @@ PATTERNS: Final[tuple[Pattern, ...]] = (
 )
 """Every address that is understood without a declaration."""
 
-SILENT: Final = (
+WITHOUT_BODY: Final = (
     "/VMC/Ext/OK",
     "/VMC/Ext/Root/Pos",
     "/VMC/Ext/Bone/Pos",

@@ -92,7 +92,9 @@ class Reader:
                 return Route(body, "parts", values, tracked, self._parts, self._converter)
             case "start" | "end" | "ms" | "s" | "smpte":
                 if not abs(values[0]) <= 1e3 * MAX_TIME_S:
-                    raise MessageError(f"{self._where} is {values[0]}; it must be finite and at most {MAX_TIME_S:g}000")
+                    raise MessageError(
+                        f"{self._where} is {values[0]}; it must be finite and at most {1e3 * MAX_TIME_S:g}"
+                    )
             case "position" if not self._is_plain:
                 values = self._converter.position(values)
             case "quat" if not self._is_plain:

@@ -27,7 +27,7 @@ IDLE_S = 0.1
 WORKING_S = 1.0
 """A sender whose messages have been of use within this time may send others that are not."""
 REPORT_S, REPEAT_S = 2.0, 60.0
-"""How often the senders are looked at for something to report, and how often the same is reported again."""
+"""How often the senders that were heard since are looked at, and how often the same is reported again."""
 _log = logging.getLogger(__name__)
 _FLOOD = "more datagrams than are read, from one sender or from senders that are not known yet"
 
@@ -74,10 +74,12 @@ class OscBodies(Receiver):
             self._thread = None
 
     def status(self) -> dict[str, Any]:
-        """What each sender's times and bodies are like, and which addresses arrive but are not understood."""
+        """What each sender's times and bodies are like, and which addresses arrive but are not used."""
+        now_s = time.monotonic()
         return {
             "senders": {
                 assembler.source: {
+                    "age_s": max(now_s - assembler.heard_s, 0.0),
                     "clock": assembler.clock.report(),
                     "sends_changes_only": assembler.memory.sends_changes_only,
                     "halves": assembler.memory.halves(),
@@ -85,7 +87,8 @@ class OscBodies(Receiver):
                 }
                 for assembler in list(self._assemblers.values())
             },
-            "not_understood": self._book.ignored.report(time.monotonic()),
+            "not_understood": self._book.ignored.report(now_s),
+            "without_body": self._book.without_body.report(now_s),
         }
 
     def _open(self, port: int) -> socket.socket:
@@ -141,21 +144,25 @@ class OscBodies(Receiver):
         if now_s - self._reported_s < REPORT_S:
             return
         self._reported_s = now_s
-        for kind, line in self._complaints():
+        for kind, line in self._complaints(now_s - REPORT_S):
             if self._log_throttle.admit(kind) is not None:
                 _log.warning("%s", line)
 
-    def _complaints(self) -> Iterator[tuple[str, str]]:
-        """What is wrong with the senders at present: the kind of the complaint, and a line for the log."""
-        working = {each.source for each in self._assemblers.values()}
-        for source, addresses in self._book.ignored.by_source().items():
-            if source not in working:
+    def _complaints(self, since_s: float) -> Iterator[tuple[str, str]]:
+        """What is wrong with the senders that were heard since then: the kind of the complaint, a line for the log."""
+        working = [each for each in self._assemblers.values() if each.heard_s >= since_s]
+        useful = {each.source for each in working}
+        for source, addresses in self._book.ignored.by_source(since_s).items():
+            if source not in useful:
                 yield (
                     "address",
                     f"{source} sends addresses that are not understood: {', '.join(addresses[:8])}; a rig file can "
                     "declare them ([[server.osc_address]], docs/protocol-in.md)",
                 )
-        for sender in self._assemblers.values():
+        for source, addresses in self._book.without_body.by_source(since_s).items():
+            if source not in useful:
+                yield "body", f"{source} sends {', '.join(addresses)}, which hold no tracked body"
+        for sender in working:
             for name, fault in sender.clock.set_aside().items():
                 yield name, f"{sender.source}: its {name} {fault}, so the {sender.clock.used} gives the times"
             for body, missing in sender.memory.halves().items():

@@ -13,7 +13,7 @@ def diagnose(report: Report) -> list[Finding]:
     """What is right and wrong with the reception that `report` describes, the same for everybody who asks."""
     findings = [*_of_sockets(report)]
     if report.get("natnet") is not None:
-        findings += of_motive(report["natnet"], bool(report.get("senders")))
+        findings += of_motive(report["natnet"])
     findings += [*of_refused(report), *of_drops(report), *of_senders(report)]
     if not report.get("senders") and not any(finding.level == "problem" for finding in findings):
         findings.append(_nothing(report))
@@ -35,7 +35,8 @@ def _of_sockets(report: Report) -> Iterator[Finding]:
 
 def _nothing(report: Report) -> Finding:
     has_heard = sum(report.get("counters", {}).get("frames_in", {}).values()) or report.get("drops")
-    if has_heard or (report.get("osc") or {}).get("not_understood"):
+    osc = report.get("osc") or {}
+    if has_heard or osc.get("not_understood") or osc.get("without_body") or osc.get("senders"):
         return Finding("problem", "nothing arrives any more", "is the sender still running?")
     addresses = ", ".join(report.get("listening", {}).values()) or "a port that is open here"
     return Finding(

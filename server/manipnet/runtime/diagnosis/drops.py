@@ -3,10 +3,8 @@
 from collections.abc import Iterator
 from typing import Final
 
-from manipnet.runtime.diagnosis.finding import Finding, Report, ago
+from manipnet.runtime.diagnosis.finding import RECENT_S, Finding, Report, ago
 
-RECENT_S: Final = 10.0
-"""What happened longer ago is history: a note."""
 FEW: Final = 0.02
 """A smaller share of the frames than this is what any network loses."""
 HARMLESS: Final = ("duplicate", "late", "time_jump", "other_sender", "jump", "zeros")
@@ -58,12 +56,16 @@ _REFUSED: Final = {
 def of_drops(report: Report) -> Iterator[Finding]:
     """What was dropped or rejected, by reason, with how often and how long ago."""
     frames_hz = sum(sender["rate_hz"] for sender in report.get("senders", {}).values())
+    actors = report.get("actors", {}).values()
+    has_live_bodies = any(body["state"] == "live" for actor in actors for body in actor.get("bodies", {}).values())
     for counter, what in _COUNTERS.items():
         for reason, drop in report.get("drops", {}).get(counter, {}).items():
             line = report.get("log", {}).get(reason, "")
             text = f"{what} as {reason}: {drop['count']} so far, {drop['rate_hz']:.0f} per second, the newest "
             text += ago(drop["age_s"]) + (f"; {line}" if line else "")
             is_normal = reason in HARMLESS and (drop["rate_hz"] <= FEW * frames_hz or drop["count"] < 10)
+            # Some senders send each body in a frame of its own, and other bodies than those of the rig.
+            is_normal = is_normal or (reason == "unknown_body" and has_live_bodies)
             if drop["age_s"] > RECENT_S or is_normal:
                 yield Finding("note", text)
             else:

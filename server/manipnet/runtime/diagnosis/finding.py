@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 Level = Literal["ok", "note", "problem"]
 Report = Mapping[str, Any]
 """What `status` reports about reception; the doctor makes the same of what it hears itself."""
+RECENT_S: Final = 10.0
+"""What happened longer ago is history: a note."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Any
 from manipnet.runtime.diagnosis.finding import Finding, listed
 
 
-def of_motive(status: Mapping[str, Any], has_senders: bool) -> Iterator[Finding]:
+def of_motive(status: Mapping[str, Any]) -> Iterator[Finding]:
     """What Motive answers, defines and streams, and what is wrong with it."""
     if status["server"] is not None:
         bodies = listed([f"{id} {name!r}" for id, name in status["bodies"].items()]) or "none"
@@ -18,7 +18,15 @@ def of_motive(status: Mapping[str, Any], has_senders: bool) -> Iterator[Finding]
     unused = ", ".join(f"{count} {what}" for what, count in status["unused"].items())
     if unused:
         yield Finding("note", f"Motive also streams what is not used: {unused}")
-    if status["state"] == "streaming" and not status["bodies"] and not status["bones"]:
+    if status["state"] != "streaming" or status["bodies"]:
+        return
+    if "bones without a name" in status["unused"]:
+        remedy = (
+            "enable Skeletons in Motive's streaming settings, so that it sends the names too, and name bones like "
+            "'Ann:LHand' in the rig; or create rigid bodies for wrists and props"
+        )
+        yield Finding("problem", "Motive streams skeletons whose bones have no names, and no rigid bodies", remedy)
+    elif not status["bones"]:
         remedy = "create rigid bodies for wrists and props, and enable Rigid Bodies in Motive's streaming settings"
         yield Finding("problem", "Motive streams frames, but defines no rigid bodies and no skeletons", remedy)
 

@@ -51,7 +51,9 @@ def _missing(part: str, key: object, arrived: Mapping[str, Mapping[str, Any]], r
         source, body = min(arrived.items(), key=lambda item: item[1]["age_s"])
         remedy = "it is switched off or no longer streamed, or its sender has stopped"
         return Finding("problem", f"{part}: body {key!r} last arrived {ago(body['age_s'])} from {source}", remedy)
-    others = sorted({label(body) for _, body in _bodies(report)})
+    if reason := _refused(key, report):
+        return Finding("problem", f"{part}: body {key!r} is refused: {reason}", "rename it, or give it another id")
+    others = sorted({label(body) for _, body in _fresh(report)})
     remedy = "give the body that name in the tracking software, or name one of these in the rig: " + listed(others)
     if not others:
         remedy = "see the lines about what arrives; no body does"
@@ -59,7 +61,7 @@ def _missing(part: str, key: object, arrived: Mapping[str, Mapping[str, Any]], r
 
 
 def _unused(report: Report, used: set[str]) -> Iterator[Finding]:
-    others = [label(body) for _, body in _bodies(report) if not used & {str(body["id"]), str(body["name"])}]
+    others = [label(body) for _, body in _fresh(report) if not used & {str(body["id"]), str(body["name"])}]
     if others and used:
         yield Finding("note", f"these bodies arrive but are not in the rig: {listed(sorted(set(others)))}")
 
@@ -68,6 +70,16 @@ def _bodies(report: Report) -> Iterator[tuple[str, Mapping[str, Any]]]:
     for source, sender in report.get("senders", {}).items():
         for body in sender["bodies"]:
             yield source, body
+
+
+def _fresh(report: Report) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    return ((source, body) for source, body in _bodies(report) if body["age_s"] <= SILENT_S)
+
+
+def _refused(key: object, report: Report) -> str:
+    """Why Motive's definitions do not tell which body is meant, if they do not."""
+    conflicts = (report.get("natnet") or {}).get("conflicts", ())
+    return next((text for text in conflicts if repr(key) in text or f"id {key} " in text), "")
 
 
 def _why(report: Report) -> str:

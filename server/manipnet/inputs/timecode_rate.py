@@ -1,4 +1,7 @@
-"""Infers the rate of a timecode, which NatNet does not send, from the frame number after which the seconds advance."""
+"""Infers the rate of a timecode from the frame number after which the seconds advance.
+
+Neither NatNet nor a bridge that sends OSC states the rate.
+"""
 
 from typing import Final
 
