@@ -14,32 +14,32 @@ from manipnet.jit import kernel, vector
 from manipnet.synthesis.rotations import rotation_vector_between_into, turn_quat_into
 
 FIT_S: Final = 0.035
-"""The velocity is fitted to this much history: long enough to average tracking noise, short enough to be current."""
+"""The velocity is fitted to this much history, which is short enough to be current; noisy histories need more of it."""
 FADE_S: Final = 0.2
 FADE_SPIN_S: Final = 0.12
 """Time constants of the fading velocity and spin; in all, a motion goes on by this time multiplied by its velocity."""
 
 
-def damped_velocity(times_s: Array, poses: Array, future_s: Array) -> Array:
+def damped_velocity(times_s: Array, poses: Array, future_s: Array, fit_s: float = FIT_S) -> Array:
     """Continue a motion, in position and rotation, from its last pose with a fading velocity.
 
-    `times_s (m,)` rise, `poses (m, 7)` are in the world, and `future_s (n,)` are at or after `times_s[-1]`. Returns
-    world poses `(n, 7)`. A history of one sample stands still.
+    `times_s (m,)` rise, `poses (m, 7)` are in the world, and `future_s (n,)` are at or after `times_s[-1]`. The velocity
+    is fitted to the last `fit_s`. Returns world poses `(n, 7)`. A history of one sample stands still.
     """
     out = np.empty((len(future_s), 7))
-    _damped_velocity(times_s, poses, future_s, out)
+    _damped_velocity(times_s, poses, future_s, fit_s, out)
     return out
 
 
 @kernel
-def _damped_velocity(times: Array, poses: Array, future: Array, out: Array):
+def _damped_velocity(times: Array, poses: Array, future: Array, fit_s, out: Array):
     newest = len(times) - 1
     last, turn, velocity, spin, weight = poses[newest], vector(), vector(), vector(), 0.0
     for k in range(3):
         velocity[k] = spin[k] = 0.0
     for i in range(newest - 1, -1, -1):
         t = times[i] - times[newest]
-        if t < -FIT_S - 1e-6 and i < newest - 1:
+        if t < -fit_s - 1e-6 and i < newest - 1:
             break
         rotation_vector_between_into(last[3:], poses[i, 3:], turn)
         weight += t * t

@@ -7,6 +7,7 @@ from typing import Final
 from manipnet.geometry import Array
 from manipnet.synthesis.model.layout import PRESENT, WINDOW_OFFSETS_S
 from manipnet.tracking.pose_buffer import TIME_TOLERANCE_S, Forecast, PoseBuffer, sample
+from manipnet.tracking.smoothing import Smoothing
 
 TICK_HZ: Final = 60
 TICK_S: Final = 1.0 / TICK_HZ
@@ -56,7 +57,11 @@ class Tick:
 
 
 def bodies_at(
-    time_s: float, until_s: float, tracks: Mapping[str, PoseBuffer], forecast: Forecast | None
+    time_s: float,
+    until_s: float,
+    tracks: Mapping[str, PoseBuffer],
+    forecast: Forecast | None,
+    smoothing: Smoothing | None = None,
 ) -> dict[str, BodyAtTick]:
     """The bodies as they are seen from the instant `time_s`, from samples up to `until_s`.
 
@@ -65,7 +70,7 @@ def bodies_at(
     tracked = {name: track for name, track in tracks.items() if len(track.times)}
     if not tracked:
         return {}
-    windows, ages = sample(list(tracked.values()), time_s + WINDOW_OFFSETS_S, time_s, until_s, forecast)
+    windows, ages = sample(list(tracked.values()), time_s + WINDOW_OFFSETS_S, time_s, until_s, forecast, smoothing)
     return {
         name: BodyAtTick(window, window[PRESENT], age_s, bool(time_s <= track.times[-1] + TIME_TOLERANCE_S))
         for (name, track), window, age_s in zip(tracked.items(), windows, ages, strict=True)
