@@ -23,8 +23,8 @@ FADE_SPIN_S: Final = 0.12
 def damped_velocity(times_s: Array, poses: Array, future_s: Array, fit_s: float = FIT_S) -> Array:
     """Continue a motion, in position and rotation, from its last pose with a fading velocity.
 
-    `times_s (m,)` rise, `poses (m, 7)` are in the world, and `future_s (n,)` are at or after `times_s[-1]`. The velocity
-    is fitted to the last `fit_s`. Returns world poses `(n, 7)`. A history of one sample stands still.
+    `times_s (m,)` rise, `poses (m, 7)` are in the world, and `future_s (n,)` are at or after `times_s[-1]`. The
+    velocity is fitted to the last `fit_s`. Returns world poses `(n, 7)`. A history of one sample stands still.
     """
     out = np.empty((len(future_s), 7))
     _damped_velocity(times_s, poses, future_s, fit_s, out)

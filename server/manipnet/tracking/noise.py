@@ -37,6 +37,10 @@ class Noise:
     interval_s: float = 0.0
 
 
+UNKNOWN: Final = Noise()
+"""What is assumed before there are enough samples."""
+
+
 def estimate_noise(times_s: Array, poses: Array) -> Noise:
     """The noise of the newest poses `(n, 7)` of a body, at rising times `(n,)`.
 

@@ -8,7 +8,7 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel
 from manipnet.synthesis.rotations import slerp_into
-from manipnet.tracking.noise import Noise, estimate_noise
+from manipnet.tracking.noise import UNKNOWN, estimate_noise
 from manipnet.tracking.smoothing import Smoothing, smooth
 
 KEEP: Final = 1024
@@ -19,8 +19,10 @@ TIME_TOLERANCE_S: Final = 1e-6
 """Two times this close are the same instant, because times are sums of rounded fractions."""
 NOISE_EVERY_S: Final = 0.25
 """How often the noise of a body is estimated again."""
-HISTORY: Final = np.linspace(-1.0, 0.0, 5)
-"""Instants of the smoothed history that is given to a forecast, in half widths of the kernel."""
+HISTORY: Final = 0.75
+"""Length of the smoothed history that is given to a forecast, in half widths of the kernel."""
+HISTORY_STEPS: Final = np.linspace(-1.0, 0.0, 5)
+
 
 class Forecast(Protocol):
     """Continues a motion beyond its history."""
@@ -33,7 +35,6 @@ class Forecast(Protocol):
         ...
 
 
-
 class PoseBuffer:
     """Poses of one body in the order of its sender's clock; samples may arrive late or in the wrong order."""
 
@@ -43,7 +44,7 @@ class PoseBuffer:
         self._count = 0
         self.seen_s = -np.inf
         """Newest instant at which the body was in a frame, tracked or not."""
-        self.noise = Noise()
+        self.noise = UNKNOWN
         """The noise of the newest samples."""
         self._estimated_s = -np.inf
 
@@ -134,13 +135,14 @@ def sample(
         if smoothing is None:
             row[beyond:] = forecast(*samples, times_s[beyond:])
         else:
-            row[beyond:] = forecast(*_smoothed_history(*samples, smoothing), times_s[beyond:], smoothing.half_width_s)
+            length_s = HISTORY * smoothing.half_width_s
+            row[beyond:] = forecast(*_smoothed_history(*samples, smoothing, length_s), times_s[beyond:], length_s)
     return poses, ages
 
 
-def _smoothed_history(times_s: Array, poses: Array, smoothing: Smoothing) -> tuple[Array, Array]:
+def _smoothed_history(times_s: Array, poses: Array, smoothing: Smoothing, length_s: float) -> tuple[Array, Array]:
     """The newest moments of a motion as evenly spaced samples: their times `(n,)` and poses `(n, 7)`."""
-    at_s = times_s[-1] + smoothing.half_width_s * HISTORY
+    at_s = times_s[-1] + length_s * HISTORY_STEPS
     smoothed = np.empty((len(at_s), 7))
     _resample(times_s, poses, at_s, at_s[-1], at_s[-1], smoothed)
     smooth(times_s, poses, smoothing, at_s, smoothed)

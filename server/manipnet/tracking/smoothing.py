@@ -35,10 +35,17 @@ NARROWEST: Final = 2.5
 """Bounds of the half width: in seconds, and in intervals of the stream."""
 CLEAN_M: Final = 1.8e-4
 CLEAN_RAD: Final = 0.18 * np.pi / 180.0
-"""Up to this noise a stream is clean and is not changed; from twice this on it is smoothed fully."""
-FITS: Final = 1.6
-MISFITS: Final = 4.0
-"""The mean squared residual, in that of the noise, up to which an instant is smoothed fully and from which it is not."""
+"""Up to this noise a stream is clean and is not changed."""
+FULL: Final = 1.5
+"""From this multiple of a clean stream's noise on, a stream is smoothed fully."""
+NEAR: Final = 1.0 / 3.0
+"""The share of the half width in which the samples are compared with the parabola."""
+FITS: Final = 3.0
+MISFITS: Final = 7.0
+"""The samples near an instant miss the parabola by their mean. If the square of that is up to `FITS` times what noise
+alone makes it, the instant is smoothed fully, and from `MISFITS` times on not at all."""
+LEVELS: Final = 3
+"""Where the parabola misfits, kernels of half the width are tried, and of a quarter."""
 FOLLOW_TICKS: Final = 30.0
 """A change of the noise is followed with this time constant, so that nothing jumps."""
 UNNOTICEABLE: Final = 1e-3
@@ -47,9 +54,11 @@ AXES: Final = 6
 """Three of the position and three of the rotation vector."""
 SMALL_SQUARE: Final = 0.04
 """The squared sine of half a turn below which the series of the arc sine is exact to 1e-10."""
-_quat, _pose, _sample, _fitted = stack_array(4), stack_array(7), stack_array(AXES), stack_array(AXES)
-_powers, _square_powers, _squares = stack_array(5), stack_array(5), stack_array(AXES)
-_sums, _slopes, _bends, _inverse = stack_array(AXES), stack_array(AXES), stack_array(AXES), stack_array(3, 3)
+_quat, _pose, _sample = stack_array(4), stack_array(7), stack_array(AXES)
+_fits, _trusts = stack_array(LEVELS, 7), stack_array(LEVELS)
+_powers, _square_powers, _inverse = stack_array(5), stack_array(5), stack_array(3, 3)
+_sums, _slopes, _bends = stack_array(AXES), stack_array(AXES), stack_array(AXES)
+_near_sums, _near_powers, _near_products = stack_array(AXES), stack_array(3), stack_array(3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +84,7 @@ class Smoother:
         """The smoothing of the next tick, from the noise of each body; None if all are clean."""
         share = units = half_width_s = 0.0
         for noise in noises:
-            excess = max(noise.position_m / CLEAN_M, noise.rotation_rad / CLEAN_RAD) - 1.0
+            excess = (max(noise.position_m / CLEAN_M, noise.rotation_rad / CLEAN_RAD) - 1.0) / (FULL - 1.0)
             if excess > 0.0:
                 own = max(noise.position_m / USUAL_M, noise.rotation_rad / USUAL_RAD)
                 width_s = HALF_WIDTH_S * (own * math.sqrt(USUAL_HZ * noise.interval_s)) ** GROWTH
@@ -84,11 +93,11 @@ class Smoother:
         if self._share == 0.0:
             self._noise, self._half_width_s = units, half_width_s
         self._share += (share - self._share) / FOLLOW_TICKS
+        if abs(self._share - share) < UNNOTICEABLE:
+            self._share = share
         if share > 0.0:  # otherwise only the share fades
             self._noise += (units - self._noise) / FOLLOW_TICKS
             self._half_width_s += (half_width_s - self._half_width_s) / FOLLOW_TICKS
-        elif self._share < UNNOTICEABLE:
-            self._share = 0.0
         return Smoothing(self._share, self._noise, self._half_width_s) if self._share else None
 
 
@@ -125,6 +134,10 @@ def _smooth(times: Array, poses: Array, share, noise, half_width, at: Array, out
 @inner
 def _blend_into(start: Array, end: Array, fraction, out: Array):
     """The pose a `fraction` of the way from one pose to another, into `out (7,)`, which may be the first."""
+    if fraction == 1.0:
+        for k in range(7):
+            out[k] = end[k]
+        return
     rotation = _quat()
     for k in range(3):
         out[k] = start[k] + fraction * (end[k] - start[k])
@@ -135,42 +148,52 @@ def _blend_into(start: Array, end: Array, fraction, out: Array):
 
 @inner
 def _smooth_at(times: Array, poses: Array, before, after, t, share, noise, half_width, out: Array):
-    """Move the pose `out (7,)` at the instant `t` towards the parabola; the samples `before` and `after` bracket it."""
+    """Smooth the pose `out (7,)` at the instant `t`; the samples `before` and `after` bracket it."""
     reach = 3.0 * half_width
     first, last = before, after
     while first > 0 and t - times[first - 1] < reach and times[first] - times[first - 1] <= half_width:
         first -= 1
     while last < len(times) - 1 and times[last + 1] - t < reach and times[last + 1] - times[last] <= half_width:
         last += 1
-    behind, ahead = min(half_width, t - times[first]), min(half_width, times[last] - t)
-    left, right = behind + 2.0 * (half_width - ahead), ahead + 2.0 * (half_width - behind)
-    reference = poses[before]
-    fitted, turn, pose = _fitted(), vector(), _pose()
-    misfit = _fit_parabola(times, poses, first, last, t, left, right, reference, noise, fitted)
-    trust = share * min(max((MISFITS - misfit) / (MISFITS - FITS), 0.0), 1.0)
-    if trust == 0.0:
-        return
-    for k in range(3):
-        pose[k], turn[k] = reference[k] + fitted[k], fitted[3 + k]
-    turn_quat_into(turn, reference[3:], pose[3:])
-    _blend_into(out, pose, trust, out)
+    fits, trusts, smoothed = _fits(), _trusts(), _pose()
+    count = 0
+    while count < LEVELS:
+        width = half_width / (1 << count)
+        behind, ahead = min(width, t - times[first]), min(width, times[last] - t)
+        left, right = behind + 2.0 * (width - ahead), ahead + 2.0 * (width - behind)
+        near = max(NEAR * width, 1.5 * (times[after] - times[before]))
+        misfit = _fit_parabola(times, poses, first, last, t, left, right, near, poses[before], noise, fits[count])
+        trusts[count] = min(max((MISFITS - misfit) / (MISFITS - FITS), 0.0), 1.0)
+        count += 1
+        if trusts[count - 1] == 1.0:
+            break
+    for k in range(7):
+        smoothed[k] = out[k]
+    for level in range(count - 1, -1, -1):
+        if trusts[level] > 0.0:
+            _blend_into(smoothed, fits[level], trusts[level], smoothed)
+    _blend_into(out, smoothed, share, out)
 
 
 @inner
-def _fit_parabola(times: Array, poses: Array, first, last, t, left, right, reference: Array, noise, fitted: Array):
-    """The parabola through weighted samples at the instant `t`, relative to the pose `reference`, into `fitted (6,)`.
+def _fit_parabola(times: Array, poses: Array, first, last, t, left, right, near, reference: Array, noise, out: Array):
+    """The pose at the instant `t` of a parabola through weighted samples about the pose `reference`, into `out (7,)`.
 
-    The weights reach `left` into the past and `right` into the future. Returns the mean squared residual of the samples
-    relative to the `noise`; it is infinite if there are too few of them.
+    The weights reach `left` into the past and `right` into the future. Returns the square of the mean residual of the
+    samples up to `near`, as a multiple of what it is by noise alone; it is infinite if there are too few samples.
     """
-    powers, square_powers, squares, sample, inverse = _powers(), _square_powers(), _squares(), _sample(), _inverse()
+    powers, square_powers, inverse, sample = _powers(), _square_powers(), _inverse(), _sample()
+    turn = vector()
     sums, slopes, bends = _sums(), _slopes(), _bends()
+    near_sums, near_powers, near_products, near_squares = _near_sums(), _near_powers(), _near_products(), 0.0
     for j in range(5):
         powers[j] = square_powers[j] = 0.0
+    for j in range(3):
+        near_powers[j] = near_products[j] = 0.0
     for k in range(AXES):
-        squares[k] = sums[k] = slopes[k] = bends[k] = 0.0
+        sums[k] = slopes[k] = bends[k] = near_sums[k] = 0.0
     scale = 1.0 / (left + right)
-    per_left, per_right = 1.0 / left, 1.0 / max(right, 1e-9)
+    per_left, per_right, per_near = 1.0 / left, 1.0 / max(right, 1e-9), 1.0 / near
     for i in range(first, last + 1):
         tau = times[i] - t
         u = tau * per_left if tau < 0.0 else tau * per_right
@@ -186,24 +209,51 @@ def _fit_parabola(times: Array, poses: Array, first, last, t, left, right, refer
         _difference_into(reference, poses[i], sample)
         for k in range(AXES):
             value = weight * sample[k]
-            squares[k] += value * sample[k]
             sums[k] += value
             slopes[k] += value * x
             bends[k] += value * (x * x)
+        v = tau * per_near
+        if -1.0 < v < 1.0:
+            near_weight = (1.0 - v * v) ** 2
+            near_squares += near_weight * near_weight
+            power = near_weight
+            for j in range(3):
+                near_powers[j] += power
+                near_products[j] += weight * power
+                power *= x
+            for k in range(AXES):
+                near_sums[k] += near_weight * sample[k]
     if not _invert_moments(powers, inverse):
         return np.inf
-    free = powers[0]
-    for i in range(3):
-        for j in range(3):
-            free -= inverse[i, j] * square_powers[i + j]
-    residual = 0.0
+    squares = 0.0
     for k in range(AXES):
         constant = inverse[0, 0] * sums[k] + inverse[0, 1] * slopes[k] + inverse[0, 2] * bends[k]
         slope = inverse[1, 0] * sums[k] + inverse[1, 1] * slopes[k] + inverse[1, 2] * bends[k]
         bend = inverse[2, 0] * sums[k] + inverse[2, 1] * slopes[k] + inverse[2, 2] * bends[k]
-        residual += squares[k] - constant * sums[k] - slope * slopes[k] - bend * bends[k]
-        fitted[k] = constant * (USUAL_M if k < 3 else USUAL_RAD)
-    return residual / (AXES * noise * noise * free) if free > 1e-6 * powers[0] else np.inf
+        residual = near_sums[k] - constant * near_powers[0] - slope * near_powers[1] - bend * near_powers[2]
+        squares += residual * residual
+        sample[k] = constant
+    for k in range(3):
+        out[k], turn[k] = reference[k] + USUAL_M * sample[k], USUAL_RAD * sample[3 + k]
+    turn_quat_into(turn, reference[3:], out[3:])
+    expected = _near_variance(inverse, square_powers, near_powers, near_products, near_squares)
+    return squares / (AXES * noise * noise * expected) if expected > 1e-6 * near_squares else np.inf
+
+
+@inner
+def _near_variance(inverse: Array, square_powers: Array, near_powers: Array, near_products: Array, near_squares):
+    """The variance of the weighted sum of the residuals near the instant, from white noise of variance 1."""
+    gains = vector()
+    for i in range(3):
+        gains[i] = 0.0
+        for j in range(3):
+            gains[i] += inverse[i, j] * near_powers[j]
+    variance = near_squares
+    for i in range(3):
+        variance -= 2.0 * gains[i] * near_products[i]
+        for j in range(3):
+            variance += gains[i] * square_powers[i + j] * gains[j]
+    return variance
 
 
 @inner

@@ -6,6 +6,7 @@ from typing import Final
 
 from manipnet.geometry import Array
 from manipnet.synthesis.model.layout import PRESENT, WINDOW_OFFSETS_S
+from manipnet.tracking.noise import UNKNOWN, Noise
 from manipnet.tracking.pose_buffer import TIME_TOLERANCE_S, Forecast, PoseBuffer, sample
 from manipnet.tracking.smoothing import Smoothing
 
@@ -33,10 +34,14 @@ class BodyAtTick:
 
 @dataclass(frozen=True, slots=True)
 class BodyHealth:
-    """How a body arrives: the rate of its tracked samples, and the age of the newest one by the stream's clock."""
+    """How a body arrives: the rate of its tracked samples, the age of the newest one, and their noise.
+
+    The age is by the stream's clock.
+    """
 
     rate_hz: float
     age_s: float
+    noise: Noise = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
