@@ -55,7 +55,7 @@ AXES: Final = 6
 SMALL_SQUARE: Final = 0.04
 """The squared sine of half a turn below which the series of the arc sine is exact to 1e-10."""
 _quat, _pose, _sample = stack_array(4), stack_array(7), stack_array(AXES)
-_fits, _trusts = stack_array(LEVELS, 7), stack_array(LEVELS)
+_ends, _fits, _trusts = stack_array(2, 7), stack_array(LEVELS, 7), stack_array(LEVELS)
 _powers, _square_powers, _inverse = stack_array(5), stack_array(5), stack_array(3, 3)
 _sums, _slopes, _bends = stack_array(AXES), stack_array(AXES), stack_array(AXES)
 _near_sums, _near_powers, _near_products = stack_array(AXES), stack_array(3), stack_array(3)
@@ -112,31 +112,31 @@ def smooth(times_s: Array, poses: Array, smoothing: Smoothing, at_s: Array, out:
 
 @kernel
 def _smooth(times: Array, poses: Array, share, noise, half_width, at: Array, out: Array):
-    start, end = _pose(), _pose()
+    ends = _ends()
     newest, after = len(times) - 1, 0
     for i in range(len(at)):
         t = min(max(at[i], times[0]), times[newest])
         while times[after] < t:
             after += 1
         before = after if times[after] == t else after - 1
-        gap = times[after] - times[before]
-        if gap <= half_width:
-            _smooth_at(times, poses, before, after, t, share, noise, half_width, out[i])
-            continue
         # Nothing is known of the motion in a gap, so that a straight line between its smoothed ends stays the guess.
-        for k in range(7):
-            start[k], end[k] = poses[before, k], poses[after, k]
-        _smooth_at(times, poses, before, before, times[before], share, noise, half_width, start)
-        _smooth_at(times, poses, after, after, times[after], share, noise, half_width, end)
-        _blend_into(start, end, (t - times[before]) / gap, out[i])
+        in_gap = times[after] - times[before] > half_width
+        for end in range(2 if in_gap else 1):
+            first = before + end
+            for k in range(7):
+                ends[end, k] = poses[first, k] if in_gap else out[i, k]
+            last, instant = (first, times[first]) if in_gap else (after, t)
+            _smooth_at(times, poses, first, last, instant, share, noise, half_width, ends[end])
+        fraction = (t - times[before]) / (times[after] - times[before]) if in_gap else 0.0
+        _blend_into(ends[0], ends[1], fraction, out[i])
 
 
 @inner
 def _blend_into(start: Array, end: Array, fraction, out: Array):
     """The pose a `fraction` of the way from one pose to another, into `out (7,)`, which may be the first."""
-    if fraction == 1.0:
+    if fraction == 0.0 or fraction == 1.0:
         for k in range(7):
-            out[k] = end[k]
+            out[k] = end[k] if fraction else start[k]
         return
     rotation = _quat()
     for k in range(3):
