@@ -8,6 +8,11 @@ START = quat_normalize(np.array([0.1, -0.4, 0.2, 0.8]))
 SPIN = np.array([0.5, 2.5, -0.7])
 
 
+def at_rest(times_s: Array) -> Array:
+    """A body that does not move, `(n, 7)`."""
+    return np.tile([0.1, 1.0, -0.3, *START], (len(times_s), 1))
+
+
 def hand_motion(times_s: Array) -> Array:
     """A hand that moves things about: swings of a decimetre at 1.5 Hz, smaller ones at 3 Hz, and turns; `(n, 7)`."""
     t = np.asarray(times_s)[:, None]

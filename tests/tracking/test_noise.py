@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.support.noisy_tracking import fall, hand_motion, shaken
+from noisy_tracking import fall, hand_motion, shaken
 
 from manipnet.tracking.noise import SPAN_S, UNKNOWN, estimate_noise
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.support.noisy_tracking import START, differences, fall, hand_motion, shaken
+from noisy_tracking import at_rest, differences, fall, hand_motion, shaken
 
 from manipnet.geometry import Array
 from manipnet.synthesis.model.layout import PRESENT, WINDOW_OFFSETS_S
-from manipnet.tracking.noise import UNKNOWN, Noise
+from manipnet.tracking.noise import SPAN_S, UNKNOWN, Noise
 from manipnet.tracking.pose_buffer import PoseBuffer, sample
 from manipnet.tracking.smoothing import CLEAN_M, FOLLOW_TICKS, Smoother, Smoothing, smooth
 from manipnet.tracking.tick import Tick
@@ -39,10 +39,6 @@ def ticks_of(times: Array, poses: dict[str, Array], look_ahead_s: float = 0.5) -
         while (tick := timeline.poll(t)) is not None:
             ticks.append(tick)
     return ticks
-
-
-def at_rest(times: Array) -> Array:
-    return np.tile([0.1, 1.0, -0.3, *START], (len(times), 1))
 
 
 @given(
@@ -198,7 +194,7 @@ def test_the_forecast_of_a_noisy_stream_does_not_throw_it_about() -> None:
 
 
 def test_smoothing_begins_and_ends_gradually() -> None:
-    smoother, noisy = Smoother(), Noise(1e-3, 0.0, 1 / 120)
+    smoother, noisy = Smoother(), Noise(1e-3, 0.0, 1 / 120, SPAN_S)
     assert smoother.follow([UNKNOWN, UNKNOWN]) is None
     shares = [smoother.follow([UNKNOWN, noisy]) for _ in range(300)]
     shares += [smoother.follow([UNKNOWN]) for _ in range(300)]

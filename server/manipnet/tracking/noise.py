@@ -30,11 +30,15 @@ _weights, _positions, _rotations = stack_array(SAMPLES), stack_array(3 * MOST), 
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations per axis of the noise of a body's poses, and the usual interval between its samples."""
+    """Standard deviations per axis of the noise of a body's poses, and the usual interval between its samples.
+
+    It is estimated from the last `span_s`, at most `SPAN_S`.
+    """
 
     position_m: float = 0.0
     rotation_rad: float = 0.0
     interval_s: float = 0.0
+    span_s: float = 0.0
 
 
 UNKNOWN: Final = Noise()
@@ -48,7 +52,8 @@ def estimate_noise(times_s: Array, poses: Array) -> Noise:
     from noise.
     """
     first = int(np.searchsorted(times_s, times_s[-1] - SPAN_S))
-    return Noise(*_estimate(times_s[first:], poses[first:]))
+    position_m, rotation_rad, interval_s = _estimate(times_s[first:], poses[first:])
+    return Noise(position_m, rotation_rad, interval_s, times_s[-1] - times_s[first]) if interval_s else UNKNOWN
 
 
 @kernel

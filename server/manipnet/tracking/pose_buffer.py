@@ -8,6 +8,7 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel
 from manipnet.synthesis.rotations import slerp_into
+from manipnet.tracking.forecast import FIT_S
 from manipnet.tracking.noise import UNKNOWN, estimate_noise
 from manipnet.tracking.smoothing import Smoothing, smooth
 
@@ -19,18 +20,20 @@ TIME_TOLERANCE_S: Final = 1e-6
 """Two times this close are the same instant, because times are sums of rounded fractions."""
 NOISE_EVERY_S: Final = 0.25
 """How often the noise of a body is estimated again."""
-HISTORY: Final = 0.75
-"""Length of the smoothed history that is given to a forecast, in half widths of the kernel."""
 HISTORY_STEPS: Final = np.linspace(-1.0, 0.0, 5)
+"""Instants of the smoothed history that is given to a forecast, from its start to its end."""
 
 
 class Forecast(Protocol):
     """Continues a motion beyond its history."""
 
-    def __call__(self, times_s: Array, poses: Array, future_s: Array, fit_s: float = ..., /) -> Array:
+    def __call__(
+        self, times_s: Array, poses: Array, future_s: Array, fit_s: float = ..., doubt: float = ..., /
+    ) -> Array:
         """From poses `(m, 7)` at `times_s (m,)` to poses `(n, 7)` at `future_s (n,)`, which are not before the last.
 
-        The last `fit_s` of the history are the current motion; a noisy history needs more of it.
+        The last `fit_s` of the history are the current motion. If the tracker was noisy, they are longer than usual,
+        and a `doubt` up to 1 says that slow motion may be noise.
         """
         ...
 
@@ -135,8 +138,9 @@ def sample(
         if smoothing is None:
             row[beyond:] = forecast(*samples, times_s[beyond:])
         else:
-            length_s = HISTORY * smoothing.half_width_s
-            row[beyond:] = forecast(*_smoothed_history(*samples, smoothing, length_s), times_s[beyond:], length_s)
+            fit_s = FIT_S + smoothing.share * (smoothing.half_width_s - FIT_S)
+            history = _smoothed_history(*samples, smoothing, fit_s)
+            row[beyond:] = forecast(*history, times_s[beyond:], fit_s, smoothing.share)
     return poses, ages
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, stack_array, vector
 from manipnet.synthesis.rotations import slerp_into, turn_quat_into
-from manipnet.tracking.noise import Noise
+from manipnet.tracking.noise import SPAN_S, Noise
 
 USUAL_M: Final = 1e-3
 USUAL_RAD: Final = 0.5 * np.pi / 180.0
@@ -33,9 +33,9 @@ GROWTH: Final = 0.5
 WIDEST_S: Final = 0.15
 NARROWEST: Final = 2.5
 """Bounds of the half width: in seconds, and in intervals of the stream."""
-CLEAN_M: Final = 1.8e-4
-CLEAN_RAD: Final = 0.18 * np.pi / 180.0
-"""Up to this noise a stream is clean and is not changed."""
+CLEAN_M: Final = 2e-4
+CLEAN_RAD: Final = 0.2 * np.pi / 180.0
+"""Up to this noise a stream is clean and is not changed. A short stream may seem to have more, when it begins fast."""
 FULL: Final = 1.5
 """From this multiple of a clean stream's noise on, a stream is smoothed fully."""
 NEAR: Final = 1.0 / 3.0
@@ -84,7 +84,8 @@ class Smoother:
         """The smoothing of the next tick, from the noise of each body; None if all are clean."""
         share = units = half_width_s = 0.0
         for noise in noises:
-            excess = (max(noise.position_m / CLEAN_M, noise.rotation_rad / CLEAN_RAD) - 1.0) / (FULL - 1.0)
+            cleans = max(noise.position_m / CLEAN_M, noise.rotation_rad / CLEAN_RAD) * math.sqrt(noise.span_s / SPAN_S)
+            excess = (cleans - 1.0) / (FULL - 1.0)
             if excess > 0.0:
                 own = max(noise.position_m / USUAL_M, noise.rotation_rad / USUAL_RAD)
                 width_s = HALF_WIDTH_S * (own * math.sqrt(USUAL_HZ * noise.interval_s)) ** GROWTH
