@@ -161,7 +161,7 @@ def test_a_gap_is_crossed_on_a_straight_line_between_calm_ends() -> None:
     times = times[(times < 0.9) | (times > 1.1)]
     poses = shaken(fall(times), NOISE_M, NOISE_RAD)
     ends = np.array([times[times < 1.0][-1], times[times > 1.0][0]])
-    at = np.linspace(*ends, 9)
+    at = np.linspace(ends[0], ends[1], 9)
     out, start_end = smoothed(times, poses, at), smoothed(times, poses, ends)
     share = np.linspace(0.0, 1.0, 9)[:, None]
     np.testing.assert_allclose(out[:, :3], start_end[0, :3] + share * (start_end[1, :3] - start_end[0, :3]), atol=1e-12)
@@ -202,3 +202,15 @@ def test_smoothing_begins_and_ends_gradually() -> None:
     assert np.abs(np.diff(values)).max() <= 1.0 / FOLLOW_TICKS
     assert values[299] > 0.99
     assert shares[-1] is None
+
+
+def test_a_noisy_body_that_is_gone_no_longer_counts() -> None:
+    times = np.arange(960) / 120.0
+    hand, noisy = hand_motion(times), shaken(at_rest(times), NOISE_M, NOISE_RAD)
+    timeline, moved = Timeline(), []
+    for t, pose, other in zip(times.tolist(), hand, noisy, strict=True):
+        timeline.push(t, {"hand": pose, "noisy": other if t < 3.0 else None}, t)
+        while (tick := timeline.poll(t)) is not None:
+            moved.append(np.abs(tick.bodies["hand"].pose[:3] - hand_motion(np.array([tick.time_s]))[0, :3]).max())
+    assert max(moved[120:180]) > 1e-5
+    assert max(moved[-30:]) < 1e-6

@@ -13,6 +13,9 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel, stack_array
 
+USUAL_M: Final = 1e-3
+USUAL_RAD: Final = 0.5 * np.pi / 180.0
+"""The unit of noise: both move a fingertip, which is 0.11 m from the wrist, by a millimetre."""
 SPAN_S: Final = 4.0
 """The estimate follows this much of the past."""
 MOST: Final = 192

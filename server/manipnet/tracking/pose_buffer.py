@@ -9,7 +9,7 @@ from manipnet.geometry import Array
 from manipnet.jit import inner, kernel
 from manipnet.synthesis.rotations import slerp_into
 from manipnet.tracking.forecast import FIT_S
-from manipnet.tracking.noise import UNKNOWN, estimate_noise
+from manipnet.tracking.noise import UNKNOWN, Noise, estimate_noise
 from manipnet.tracking.smoothing import Smoothing, smooth
 
 KEEP: Final = 1024
@@ -20,6 +20,8 @@ TIME_TOLERANCE_S: Final = 1e-6
 """Two times this close are the same instant, because times are sums of rounded fractions."""
 NOISE_EVERY_S: Final = 0.25
 """How often the noise of a body is estimated again."""
+FORGET_S: Final = 1.0
+"""The noise of a body that has been lost for this long no longer counts."""
 HISTORY_STEPS: Final = np.linspace(-1.0, 0.0, 5)
 """Instants of the smoothed history that is given to a forecast, from its start to its end."""
 
@@ -94,6 +96,10 @@ class PoseBuffer:
         """Time since the newest tracked sample at or before `t_s`; infinite if there is none."""
         before = int(np.searchsorted(self.times, t_s + TIME_TOLERANCE_S))
         return max(t_s - float(self._times[before - 1]), 0.0) if before else np.inf
+
+    def noise_at(self, t_s: float) -> Noise:
+        """The noise of the newest samples, which is unknown if the body has been lost for long at `t_s`."""
+        return self.noise if self._count and t_s - self._times[self._count - 1] < FORGET_S else UNKNOWN
 
     def _align(self, at: int) -> None:
         """Keep neighbouring quaternions in one hemisphere, because trackers may flip their signs."""

@@ -196,7 +196,7 @@ class Timeline:
         silent = due_s > run.arrivals.newest_s + TIME_TOLERANCE_S
         # A sender that has stopped is not forecast; its last pose stands.
         forecast = None if silent else self._forecast
-        smoothing = self._smoother.follow(track.noise for track in run.tracks.values())
+        smoothing = self._smoother.follow(track.noise_at(time_s) for track in run.tracks.values())
         bodies = bodies_at(time_s, due_s, run.tracks, forecast, smoothing)
         return Tick(
             run=run.number,
