@@ -1,17 +1,20 @@
 """OSC addresses that senders use, and the assembly of messages into frames, with arrival times given by the test."""
 
 import math
+import random
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from osc_streams import HZ, bodies, milliseconds
 from osc_writer import bundle, osc
 
 from manipnet.geometry import quat_multiply, quat_to_matrix
 from manipnet.inputs.osc.assembler import CLOCK_PATIENCE, GAP_S, MARKED_GAP_S, FrameAssembler
 from manipnet.inputs.osc.packet import NTP_TO_UNIX_S, split_packet
 from manipnet.inputs.osc.space import AXES, Space
+from manipnet.tracking.timeline import Timeline
 from manipnet.wire.bodies import MAX_BODIES
 
 UNITY = Space(AXES["unity"]).converter()
@@ -245,6 +248,23 @@ def test_a_sender_that_stops_giving_times_is_accepted_after_a_while():
     frames = [assembler.add(timeless, 51.0 + n)[0] for n in range(CLOCK_PATIENCE + 2)]
     assert [len(f) for f in frames] == [0] * CLOCK_PATIENCE + [1, 1]
     assert frames[-1][0].t_s == 51.0 + CLOCK_PATIENCE + 1
+
+
+@pytest.mark.parametrize("jitter_s", [0.0, 0.006, 0.02])
+def test_a_clock_that_stands_still_for_a_second_costs_few_frames(jitter_s):
+    """From the datagrams to the timeline of an actor, without the load of this machine."""
+    assembler, timeline, jitter = FrameAssembler("osc:test"), Timeline(0.1), random.Random(1)
+    used, now_s, ms = 0, 100.0, 0
+    for k in range(4 * HZ):
+        now_s = max(now_s, 100.0 + k / HZ + jitter.uniform(0.0, jitter_s))
+        ms = milliseconds(k) if not HZ <= k < 2 * HZ else ms
+        datagram = bundle(stamp(ms), *(osc(f"/rigidbody/{i}/transformation", *p) for i, p in bodies(k)))
+        for frame in assembler.add(split_packet(datagram), now_s).frames:
+            found = {str(sample.id): np.array([*sample.p, *sample.q]) for sample in frame.bodies}
+            used += timeline.push(frame.t_s, found, frame.t_received_s) is None
+        while timeline.poll(now_s) is not None:
+            pass
+    assert used > 0.97 * 4 * HZ
 
 
 def test_bodies_beyond_the_limit_are_dropped():

@@ -353,4 +353,4 @@ def test_a_clock_that_stops_in_between_costs_little(server):
 
     outcome = Outcome(server, frame, 4.0)
     assert ("live",) * 3 in outcome.states("ids")
-    assert outcome.used > 0.8
+    assert outcome.used > 0.8, "0.98 without other load: test_osc_assembler"

@@ -4,7 +4,6 @@ The same links with real sockets, servers and time are measured by `python -m be
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -49,7 +48,7 @@ def receive(bundle: Bundle, tmp_path: Path):
         for now_s in np.arange(0.0, SECONDS + 1.0, STEP_S).tolist():
             while arrivals and arrivals[0][0] <= now_s:
                 at_s, t_s = arrivals.pop(0)
-                bench.mailbox.put(replace(frame(t_s, scene(t_s)), t_received_s=at_s))
+                bench.mailbox.put(frame(t_s, scene(t_s))._replace(t_received_s=at_s))
             bench.loop.take_in(0.0)
             while bench.loop.step(now_s):
                 pass

@@ -3,7 +3,6 @@
 import itertools
 import math
 import random
-from dataclasses import replace
 
 import natnet_capture
 import pytest
@@ -145,7 +144,7 @@ def test_a_body_near_the_origin_may_be_at_the_origin():
 def moving(frames):
     """The same frames with a second body that moves."""
     others = [frame(f.t_s, ("other", (0.5 * math.sin(f.t_s), 2.0, 0.0))) for f in frames]
-    return [replace(f, bodies=f.bodies + other.bodies) for f, other in zip(frames, others, strict=True)]
+    return [f._replace(bodies=f.bodies + other.bodies) for f, other in zip(frames, others, strict=True)]
 
 
 def test_a_tracked_body_that_freezes_is_rejected_until_it_moves_again():

@@ -7,7 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, Protocol
 
@@ -158,6 +158,6 @@ def looped(frames: Sequence[BodyFrame]) -> Iterator[BodyFrame]:
     shift_s, number = 0.0, 0
     while True:
         for frame in frames:
-            yield replace(frame, t_s=frame.t_s + shift_s, frame=number)
+            yield frame._replace(t_s=frame.t_s + shift_s, frame=number)
             number += 1
         shift_s += length_s

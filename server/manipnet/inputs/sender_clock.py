@@ -31,6 +31,8 @@ AHEAD_S: Final = 0.1
 """How far frames that arrive in a bunch may be moved into the future of the newest arrival."""
 FORGOTTEN_FRAMES: Final = 30
 """A clock that was no longer stated must be stated so often in a row before it is used again."""
+ARRIVAL: Final = "arrival"
+"""The name of the clock that is used when no other runs."""
 _RATE_FRAMES: Final = 32
 _STILL: Final = "stands still"
 
@@ -128,13 +130,15 @@ class SenderClock:
     def __init__(self, names: Iterable[str], plausible: tuple[float, float] = PLAUSIBLE) -> None:
         self.clocks = tuple(Clock(name, plausible) for name in names)
         self._used: Clock | None = None
+        self._has_forgotten = False
+        """Whether it matters how many frames in a row state a clock."""
         self._arrivals = deque[float](maxlen=_RATE_FRAMES)
         self._last_s = -math.inf
 
     @property
     def used(self) -> str:
         """The name of the clock in use."""
-        return "arrival" if self._used is None else self._used.name
+        return ARRIVAL if self._used is None else self._used.name
 
     def report(self) -> dict[str, object]:
         """The clock in use, and the clocks that were set aside with the reason for each."""
@@ -148,6 +152,7 @@ class SenderClock:
         """Go by the next clock that frames state, because the sender no longer states the one in use."""
         if self._used is not None:
             self._used.needs = FORGOTTEN_FRAMES
+            self._has_forgotten = True
         self._used = None
 
     def choose(self, stated_s: tuple[float | None, ...], now_s: float, repeats: bool) -> float | None:
@@ -155,8 +160,9 @@ class SenderClock:
 
         A frame that `repeats` the one before is not spread when the arrivals come in bunches.
         """
-        for clock, t_s in zip(self.clocks, stated_s, strict=True):
-            clock.streak = 0 if t_s is None else clock.streak + 1
+        if self._has_forgotten:
+            for clock, t_s in zip(self.clocks, stated_s, strict=True):
+                clock.streak = 0 if t_s is None else clock.streak + 1
         used = self._used
         if used is None or used.runs is False:
             used = self._used = self._best(stated_s)
@@ -167,7 +173,7 @@ class SenderClock:
     def _best(self, stated_s: tuple[float | None, ...]) -> Clock | None:
         stated = [clock for clock, t_s in zip(self.clocks, stated_s, strict=True) if t_s is not None]
         trusted = (each for each in stated if each.runs or (each.runs is None and not each.doubtful))
-        return next((clock for clock in trusted if clock.streak >= clock.needs), None)
+        return next((clock for clock in trusted if clock.needs == 1 or clock.streak >= clock.needs), None)
 
     def _arrival_s(self, now_s: float, repeats: bool) -> float:
         """The arrival of a frame. Frames that arrive together are spread by the sender's usual interval."""

@@ -12,11 +12,17 @@ from manipnet.inputs.base import Sink
 from manipnet.wire.bodies import MAX_BODIES, BodyFrame
 
 MOST = 64
+MOST_WAITING = 32
+"""Frames whose bodies are counted together."""
 RATE_S = 1.0
 CLOCK_S = 10.0
 """The fastest frame of the last one to two of these periods counts, since clocks drift."""
 RESTART_S = 1.0
 """Transit times vary by less than this. A larger change means that the sender's clock was set or restarted."""
+
+
+_Key = tuple[int | None, str | None]
+"""Id and name of a body."""
 
 
 @dataclass(slots=True)
@@ -75,7 +81,9 @@ class _Sender:
     offset_s: float
     offset_before_s: float
     pace: _Pace
-    bodies: dict[tuple[int | None, str | None], _Body] = field(default_factory=dict)
+    bodies: dict[_Key, _Body] = field(default_factory=dict)
+    waiting: list[BodyFrame] = field(default_factory=list)
+    """The newest frames, whose bodies are not counted yet."""
 
 
 class SenderStats:
@@ -98,6 +106,8 @@ class SenderStats:
         its bodies, each with its rate, its age and the share of the frames in which it is tracked.
         """
         with self._lock:
+            for sender in self._senders.values():
+                _digest(sender)
             return {
                 source: {
                     "frames": sender.frames,
@@ -121,7 +131,9 @@ class SenderStats:
         if len(self._senders) >= MOST:
             del self._senders[next(iter(self._senders))]  # the sender that has been silent for longest
         self._senders[frame.source] = sender
-        self._note_bodies(sender.bodies, frame, now_s)
+        sender.waiting.append(frame)
+        if len(sender.waiting) >= MOST_WAITING:
+            _digest(sender)
         sender.frames += 1
         sender.heard_s = now_s
         sender.pace.note(frame.t_s, now_s)
@@ -133,17 +145,34 @@ class SenderStats:
             sender.clocked_s, sender.offset_before_s, sender.offset_s = now_s, sender.offset_s, offset_s
         sender.offset_s = max(sender.offset_s, offset_s)
 
-    @staticmethod
-    def _note_bodies(bodies: dict[tuple[int | None, str | None], _Body], frame: BodyFrame, now_s: float) -> None:
-        for sample in frame.bodies:
-            key = sample.id, sample.name
-            body = bodies.get(key)
-            if body is None:
-                if len(bodies) >= MAX_BODIES:
-                    del bodies[min(bodies, key=lambda each: bodies[each].heard_s)]
-                body = bodies[key] = _Body(now_s)
-            elif now_s - body.since_s >= RATE_S and body.counted:
-                body.turn(now_s)
-            body.heard_s = now_s
-            body.counted += 1
-            body.tracked += sample.tracked
+
+def _digest(sender: _Sender) -> None:
+    """Count the bodies of the frames that wait. Most have the same bodies as the one before."""
+    keys: list[_Key] = []
+    group: list[BodyFrame] = []
+    for frame in sender.waiting:
+        own = [(sample.id, sample.name) for sample in frame.bodies]
+        if group and own != keys:
+            _count(sender.bodies, keys, group)
+            group = []
+        keys = own
+        group.append(frame)
+    if group:
+        _count(sender.bodies, keys, group)
+    sender.waiting = []
+
+
+def _count(bodies: dict[_Key, _Body], keys: list[_Key], group: list[BodyFrame]) -> None:
+    """Count frames that all have the bodies `keys`, in this order."""
+    first_s, newest_s = group[0].t_received_s, group[-1].t_received_s
+    for i, key in enumerate(keys):
+        body = bodies.get(key)
+        if body is None:
+            if len(bodies) >= MAX_BODIES:
+                del bodies[min(bodies, key=lambda each: bodies[each].heard_s)]
+            body = bodies[key] = _Body(first_s)
+        elif first_s - body.since_s >= RATE_S and body.counted:
+            body.turn(first_s)
+        body.heard_s = newest_s
+        body.counted += len(group)
+        body.tracked += sum([frame.bodies[i].tracked for frame in group])

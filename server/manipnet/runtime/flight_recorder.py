@@ -7,7 +7,6 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
@@ -63,13 +62,17 @@ class FlightRecorder:
 
 
 def _write(path: Path, error: Sequence[str], ticks: Sequence[Tick], frames: Sequence[BodyFrame]) -> None:
-    content = {"error": error, "ticks": [_tick(tick) for tick in ticks], "frames": [asdict(frame) for frame in frames]}
+    content = {"error": error, "ticks": [_tick(tick) for tick in ticks], "frames": [_frame(frame) for frame in frames]}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
             file.write(json.dumps(content).encode("utf-8"))
     except OSError as problem:
         _log.error("the frames before an error cannot be written to %s: %s", path.parent, problem)
+
+
+def _frame(frame: BodyFrame) -> dict[str, Any]:
+    return {**frame._asdict(), "bodies": [body._asdict() for body in frame.bodies]}
 
 
 def _tick(tick: Tick) -> dict[str, Any]:

@@ -6,7 +6,7 @@ body. The timeline deals with time that goes backwards and with duplicate and la
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 from manipnet.wire.bodies import BodyFrame, BodySample
@@ -71,7 +71,7 @@ class OutlierGate:
         swapped = self._swapped(frame)
         bodies = [self._judge(frame, body, body in swapped) for body in frame.bodies]
         reasons = [body.fault for body in bodies if body.fault is not None]
-        return (replace(frame, bodies=tuple(bodies)) if reasons else frame), reasons
+        return (frame._replace(bodies=tuple(bodies)) if reasons else frame), reasons
 
     def _judge(self, frame: BodyFrame, body: BodySample, swapped: bool) -> BodySample:
         if not body.tracked:
@@ -89,7 +89,7 @@ class OutlierGate:
         fault = _fault(history, frame.t_s, body, swapped, others_move)
         if history.changed_s == frame.t_s:
             self._moved_s[frame.source] = frame.t_s
-        return body if fault is None else replace(body, tracked=False, fault=fault)
+        return body if fault is None else body._replace(tracked=False, fault=fault)
 
     def _swapped(self, frame: BodyFrame) -> Sequence[BodySample]:
         """Bodies that exchanged their places in one step, as they do when a tracker confuses two of them."""

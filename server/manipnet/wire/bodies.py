@@ -7,8 +7,7 @@ message does not spoil the frame: that body becomes untracked, and its `fault` s
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgpack
 
@@ -36,8 +35,7 @@ class MessageError(ValueError):
     """A message that cannot be used. The text names what is wrong, where, and what is allowed."""
 
 
-@dataclass(frozen=True, slots=True)
-class BodySample:
+class BodySample(NamedTuple):
     """One body at one instant, in the project frame (right-handed, Y up, metres, xyzw).
 
     `q` is a unit quaternion. If `tracked` is false, `p` and `q` must not be used. `fault` is one of `FAULTS` if the
@@ -52,8 +50,7 @@ class BodySample:
     fault: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class BodyFrame:
+class BodyFrame(NamedTuple):
     """The bodies at one instant: `t_s` on the sender's clock, `t_received_s` on ours (`time.monotonic`).
 
     `source` identifies the sender: its protocol, a colon, and its address, for example "osc:10.0.0.7:50123".

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 import zmq
@@ -407,6 +408,21 @@ def with_options(beside, *options: str) -> Iterator[list[str]]:
         yield [*more, *options]
 
 
+PAGE = Path(__file__).parents[3] / "docs" / "troubleshooting.md"
+QUOTED = [
+    quoted
+    for cell in re.findall(r"^\| ([^|]*`[^|]*) \|", PAGE.read_text(encoding="utf-8"), re.M)
+    for quoted in re.findall(r"`([^`]*)`", cell)
+    if " " in quoted
+]
+"""What the page quotes of the doctor."""
+
+
+def quotes(piece: str, line: str) -> bool:
+    """Whether a line has what the page quotes, in which "…" stands for anything."""
+    return re.search(".*".join(map(re.escape, piece.split("…"))), line) is not None
+
+
 @pytest.mark.parametrize("name", SETUPS)
 def test_the_trouble_is_named_with_its_remedy(name, ports, rig, capsys):
     beside, arguments, trouble, remedy = SETUPS[name]
@@ -419,6 +435,8 @@ def test_the_trouble_is_named_with_its_remedy(name, ports, rig, capsys):
         assert status == 1
         assert lines[at].startswith("problem ")
         assert remedy in lines[at + 1]
+    problems = [line for line in lines if line.startswith("problem ")]
+    assert [line for line in problems if not any(quotes(piece, line) for piece in QUOTED)] == [], "troubleshooting.md"
     if name != "nothing is sent":
         assert "nothing arrives at all" not in "\n".join(lines) or beside in (nothing, port_taken, closed_port, motive)
 

@@ -75,7 +75,7 @@ def endless(scenario: Scenario, actors: int = 1) -> Iterator[BodyFrame]:
     k = 0
     while True:
         bodies = tuple(
-            replace(body, name=_prefix(name, actors) + (body.name or ""))
+            body._replace(name=_prefix(name, actors) + (body.name or ""))
             for name, shift in zip(names, ahead, strict=True)
             for body in frames[_bounced(k + shift, len(frames))].bodies
         )

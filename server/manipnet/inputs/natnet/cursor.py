@@ -1,6 +1,7 @@
 """A position in a NatNet payload, which stays within the payload whatever the payload says."""
 
 import struct
+from collections.abc import Iterable
 from typing import Final
 
 from manipnet.wire.bodies import MessageError
@@ -13,13 +14,13 @@ class Cursor:
     """A position in one payload. It stays within the payload and limits the number of parts."""
 
     def __init__(self, payload: bytes) -> None:
-        self._data = payload
+        self._data, self._size = payload, len(payload)
         self._offset = 0
         self._parts = 0
 
     def skip(self, size: int) -> None:
-        if size > self.left():
-            raise MessageError(f"a NatNet payload ends at byte {len(self._data)}, where {size} more are needed")
+        if size > self._size - self._offset:
+            raise MessageError(f"a NatNet payload ends at byte {self._size}, where {size} more are needed")
         self._offset += size
 
     def part(self) -> None:
@@ -32,15 +33,26 @@ class Cursor:
         self.skip(layout.size)
         return layout.unpack_from(self._data, start)
 
+    def rows(self, layout: struct.Struct, count: int, extra: int = 0) -> Iterable[tuple]:
+        """The values of `count` structures in a row, each of which is followed by `extra` bytes."""
+        start, size = self._offset, layout.size + extra
+        self.skip(count * size)
+        if not extra:
+            return layout.iter_unpack(self._data[start : self._offset])
+        return [layout.unpack_from(self._data, start + i * size) for i in range(count)]
+
     def int32(self) -> int:
         start = self._offset
-        self.skip(4)
-        return int.from_bytes(self._data[start : start + 4], "little", signed=True)
+        end = self._offset = start + 4
+        if end > self._size:
+            self._offset = start
+            self.skip(4)
+        return int.from_bytes(self._data[start:end], "little", signed=True)
 
     def count(self) -> int:
         count = self.int32()
-        if not 0 <= count <= len(self._data):
-            raise MessageError(f"a NatNet payload of {len(self._data)} bytes announces {count} elements")
+        if not 0 <= count <= self._size:
+            raise MessageError(f"a NatNet payload of {self._size} bytes announces {count} elements")
         return count
 
     def text(self) -> bytes:
@@ -52,13 +64,17 @@ class Cursor:
         return self._data[start:end]
 
     def left(self) -> int:
-        return len(self._data) - self._offset
+        return self._size - self._offset
 
     def section(self) -> "Cursor":
         """A cursor over the section whose byte size comes next. This cursor moves behind the section."""
+        start = self._offset + 4
+        self.skip_section()
+        return Cursor(self._data[start : self._offset])
+
+    def skip_section(self) -> None:
+        """Move behind the section whose byte size comes next."""
         size = self.int32()
-        if not 0 <= size <= self.left():
+        if not 0 <= size <= self._size - self._offset:
             raise MessageError(f"a NatNet section announces {size} bytes, but {self.left()} are left")
-        start = self._offset
-        self.skip(size)
-        return Cursor(self._data[start : start + size])
+        self._offset += size

@@ -7,9 +7,8 @@ and the Python client of the NatNet SDK, whose readers name the version of each 
 """
 
 import struct
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
 
 from manipnet.inputs.natnet.cursor import Cursor
 from manipnet.inputs.natnet.protocol import Version
@@ -32,8 +31,7 @@ _MARKER = 20
 """Position, id and size of a marker of a body, before 3.0."""
 
 
-@dataclass(frozen=True, slots=True)
-class RigidBody:
+class RigidBody(NamedTuple):
     """One body as it was streamed: `p` in the server's units and axes, and `q` xyzw, not normalised."""
 
     id: int
@@ -43,16 +41,14 @@ class RigidBody:
     tracked: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Skeleton:
+class Skeleton(NamedTuple):
     """The bones of one skeleton. Their ids count within the skeleton."""
 
     id: int
     bones: tuple[RigidBody, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class MocapFrame:
+class MocapFrame(NamedTuple):
     """One frame: its rigid bodies, `timestamp_s` since the server started, and time stamps in ticks of its clock."""
 
     number: int
@@ -67,7 +63,7 @@ class MocapFrame:
     skeletons: tuple[Skeleton, ...] = ()
     timecode: str | None = None
     """HH:MM:SS:FF, or None if there is none."""
-    unused: dict[str, int] = field(default_factory=dict)
+    unused: Mapping[str, int] = {}
     """What else is in the frame, and how often."""
 
 
@@ -121,7 +117,7 @@ def _skip(
     if count and unused is not None:
         unused[name] = count
     if sized:
-        cursor.section()
+        cursor.skip_section()
         return
     for _ in range(count):
         cursor.part()
@@ -138,19 +134,28 @@ def _read_bodies(cursor: Cursor, sized: bool, has_markers: bool) -> tuple[RigidB
         extra = cursor.left() // count - _BODY.size if count else 0
         if extra < 0:
             raise MessageError(f"a NatNet section of {cursor.left()} bytes announces {count} rigid bodies")
-    return tuple([_read_body(cursor, has_markers, extra) for _ in range(count)])
+    return _read_all(cursor, count, has_markers, extra)
 
 
-def _read_body(cursor: Cursor, has_markers: bool, extra: int = 0) -> RigidBody:
+def _read_all(cursor: Cursor, count: int, has_markers: bool, extra: int = 0) -> tuple[RigidBody, ...]:
     if has_markers:
-        id, px, py, pz, qx, qy, qz, qw = cursor.unpack(_POSE_ONLY)
-        cursor.part()
-        cursor.skip(_MARKER * cursor.count())
-        mean_error, params = cursor.unpack(_QUALITY)
-    else:
-        id, px, py, pz, qx, qy, qz, qw, mean_error, params = cursor.unpack(_BODY)
-        cursor.skip(extra)
-    return RigidBody(id, (px, py, pz), (qx, qy, qz, qw), mean_error, bool(params & 1))
+        return tuple([_read_marked(cursor) for _ in range(count)])
+    bodies = cursor.rows(_BODY, count, extra)
+    return tuple(
+        [
+            RigidBody(id, (px, py, pz), (qx, qy, qz, qw), mean_error, params & 1 == 1)
+            for id, px, py, pz, qx, qy, qz, qw, mean_error, params in bodies
+        ]
+    )
+
+
+def _read_marked(cursor: Cursor) -> RigidBody:
+    """A body of a version before 3.0, which is followed by its markers."""
+    id, px, py, pz, qx, qy, qz, qw = cursor.unpack(_POSE_ONLY)
+    cursor.part()
+    cursor.skip(_MARKER * cursor.count())
+    mean_error, params = cursor.unpack(_QUALITY)
+    return RigidBody(id, (px, py, pz), (qx, qy, qz, qw), mean_error, params & 1 == 1)
 
 
 def _read_skeletons(cursor: Cursor, sized: bool, has_markers: bool) -> tuple[Skeleton, ...]:
@@ -166,7 +171,7 @@ def _read_skeletons(cursor: Cursor, sized: bool, has_markers: bool) -> tuple[Ske
                 break  # the rest is skipped with its section
             raise MessageError(f"a NatNet frame has more than {MAX_BODIES} bones")
         bones_left -= bones
-        skeletons.append(Skeleton(id, tuple([_read_body(cursor, has_markers) for _ in range(bones)])))
+        skeletons.append(Skeleton(id, _read_all(cursor, bones, has_markers)))
     return tuple(skeletons)
 
 

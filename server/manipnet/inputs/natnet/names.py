@@ -25,6 +25,8 @@ class Names:
         self._tries = 0
         """How often definitions came that did not name the unknown ids."""
         self._asked_s = float("-inf")
+        self._present: tuple[list[int], list[int]] | None = None
+        """The ids of bodies and skeletons in the newest frame, since there were definitions."""
 
     def forget(self) -> None:
         """Ask for the definitions again, because they may have changed."""
@@ -34,13 +36,18 @@ class Names:
         """Take new definitions."""
         self.definitions, self._wanted = definitions, False
         self.bodies, self.conflicts = definitions.names(), tuple(definitions.conflicts())
-        self._ids = frozenset(id for id, _ in definitions.bodies)
+        self._ids, self._present = frozenset(id for id, _ in definitions.bodies), None
         self._tries += bool(self._unknown)
 
     def note(self, frame: MocapFrame) -> None:
         """Note which ids a frame has. One that is not defined is reason enough to ask."""
         if frame.models_changed:
             self.forget()
+        present = [body[0] for body in frame.bodies], [skeleton[0] for skeleton in frame.skeletons]
+        if present == self._present:
+            self._wanted = self._wanted or bool(self._unknown)
+            return
+        self._present = present
         ids, skeletons = self._ids, self.definitions.skeletons
         unknown: set[object] = {body.id for body in frame.bodies if body.id not in ids}
         if frame.skeletons:
@@ -63,6 +70,8 @@ class Names:
         """The bones of a frame that have a name, with their names."""
         names = self.definitions.bones
         for skeleton in frame.skeletons:
+            if skeleton.id not in self.definitions.skeletons:
+                continue
             for bone in skeleton.bones:
                 name = names.get((skeleton.id, bone.id & 0xFFFF))
                 if name is not None:

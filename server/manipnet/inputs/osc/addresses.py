@@ -42,7 +42,9 @@ class AddressBook:
         A message whose address or form is not understood is noted in `ignored`, whatever is in it.
         """
         raw, offset = read_address(message)
-        readers = self._cache[raw] if raw in self._cache else self._find(raw)
+        readers = self._cache.get(raw)
+        if readers is None:
+            readers = self._find(raw)
         if not isinstance(readers, tuple):
             if isinstance(readers, MessageError):
                 raise readers

@@ -9,7 +9,7 @@ from manipnet.inputs.osc.addresses import AddressBook
 from manipnet.inputs.osc.memory import REFUSED, BodyMemory, Fields
 from manipnet.inputs.osc.packet import IMMEDIATELY, Packet, time_tag_to_s
 from manipnet.inputs.osc.reader import BodyKey, Route
-from manipnet.inputs.sender_clock import SenderClock
+from manipnet.inputs.sender_clock import ARRIVAL, SenderClock
 from manipnet.inputs.timecode_rate import TimecodeRate
 from manipnet.wire.bodies import MAX_BODIES, BodyFrame, BodySample, MessageError
 from manipnet.wire.timecode import timecode_text
@@ -25,6 +25,7 @@ VMC_TIME_S: Final = 0.1
 CLOCKS: Final = ("time tag", "/frame/timestamp", "/VMC/Ext/T")
 """The clocks of a sender, best first."""
 _POSES: Final = frozenset(("position", "quat", "transformation", "local"))
+_OF_BODY: Final = _POSES | {"tracked", "parts"}
 
 
 @dataclass(slots=True)
@@ -129,6 +130,9 @@ class FrameAssembler:
         if time_tag > IMMEDIATELY and pending.time_tag != time_tag:
             pending.time_tag = time_tag
             self._note_tag(time_tag, now_s)
+        if route.field in _OF_BODY:
+            self._take_body(route)
+            return
         match route.field:
             case "start":
                 pending.number, pending.marked = int(route.values[0]), True
@@ -141,17 +145,19 @@ class FrameAssembler:
                 self.memory.name(route.body, route.text)
             case "skeleton":
                 self._book.name_skeleton(route.body, route.text)
-            case _ if route.body in pending.bodies:
-                fields = pending.bodies[route.body]
-                # A datagram that arrives twice repeats its values; another value is that of another body.
-                if pending.marked and route.field in _POSES and fields.get(route.field, route.values) != route.values:
-                    fields[REFUSED] = True
-                add_to(fields, route)
-            case _ if len(pending.bodies) < MAX_BODIES:
-                fields = pending.bodies[route.body] = {}
-                add_to(fields, route)
-            case _:
+
+    def _take_body(self, route: Route) -> None:
+        pending = self._pending
+        fields = pending.bodies.get(route.body)
+        if fields is None:
+            if len(pending.bodies) >= MAX_BODIES:
                 self.incomplete += 1
+                return
+            fields = pending.bodies[route.body] = {}
+        elif pending.marked and route.field in _POSES and fields.get(route.field, route.values) != route.values:
+            # A datagram that arrives twice repeats its values; another value is that of another body.
+            fields[REFUSED] = True
+        add_to(fields, route)
 
     def _note_tag(self, time_tag: int, now_s: float) -> None:
         clock = self.clock.clocks[0]
@@ -210,7 +216,7 @@ class FrameAssembler:
         tag_s = None if pending.time_tag <= IMMEDIATELY else time_tag_to_s(pending.time_tag)
         vmc_s = self._vmc_s(pending)
         arrived_s = pending.touched_s if pending.begun_s is None else pending.begun_s
-        repeats, self._bodies = bodies == self._bodies, bodies
+        repeats, self._bodies = self.clock.used == ARRIVAL and bodies == self._bodies, bodies
         t_s = self.clock.choose((tag_s, pending.stamp_s, vmc_s), arrived_s, repeats)
         if t_s is not None:
             self._without_clock = 0
@@ -248,7 +254,7 @@ def _same_keys(routes: list[tuple[int, Route]]) -> Collection[BodyKey]:
 
     If every body occurs as often as the others, the datagram holds several frames.
     """
-    keys = [(route.body, route.field) for _, route in routes if route.field in _POSES]
+    keys = [route[:2] for _, route in routes if route[1] in _POSES]
     if len(set(keys)) == len(keys) or min(Counter(keys).values()) > 1:
         return frozenset()
     values = {(route.body, route.field, route.values) for _, route in routes if route.field in _POSES}

@@ -107,6 +107,12 @@ def read_arguments(message: bytes, offset: int, expected: Collection[object] = (
     layout = _numbers_layout(tags)
     if layout is not None and after + layout.size == len(message):
         return layout.unpack_from(message, after)
+    if tags[:2] == b",s":  # a body, and its pose
+        layout = _numbers_layout(b"," + tags[2:])
+        if layout is not None:
+            end, numbers = _text_end(message, after, "text argument")
+            if numbers + layout.size == len(message) and len(tags) <= MAX_ARGUMENTS + 1:
+                return read_text(message[after:end], expected), *layout.unpack_from(message, numbers)
     return _read_any(tags.decode("latin-1"), message, after, expected)
 
 

@@ -13,6 +13,8 @@ BodyKey = int | str
 KeyOf = Callable[[Mapping[str, Argument], str], BodyKey]
 """The key of the body that the words `body`, or `skeleton` and `bone`, name in a message to some address."""
 
+MOST_KNOWN: Final = 256
+"""Texts of bodies whose keys are remembered."""
 _FLOATS: Final = {float}
 _POSE: Final = (*POSITION, *QUATERNION)
 _EULER_POSE: Final = (*POSITION, *EULER)
@@ -52,6 +54,9 @@ class Reader:
         self._where, self._words, self._key_of = found.string, pattern.words, key_of
         self._literals = [(i, word[1:]) for i, word in enumerate(self._words) if word.startswith("=")]
         self._keys = [(i, word) for i, word in enumerate(self._words) if word in KEYS]
+        self._place = self._keys[0][0] if [word for _, word in self._keys] == ["body"] else None
+        """The place of the argument that alone names the body, if there is one."""
+        self._bodies: dict[Argument, BodyKey] = {}
         self._groups = {"body": pattern.body} if pattern.body else found.groupdict()
         self._body = key_of(self._groups, self._where) if self._groups and not self._keys else ""
         places = {word: i for i, word in enumerate(self._words)}
@@ -74,8 +79,7 @@ class Reader:
             raise MessageError(f"{self._where} has {len(arguments)} arguments; it must have {self._needed()}")
         body = self._body
         if self._keys:
-            given = {word: arguments[i] for i, word in self._keys}
-            body = self._key_of(self._groups | given if self._groups else given, self._where)
+            body = self._named(arguments)
         if self._name is not None:
             return Route(body, self._field, (), text=str(arguments[self._name]))
         values = arguments[self._slice] if self._slice is not None else tuple([arguments[i] for i in self._numbers])
@@ -83,6 +87,18 @@ class Reader:
             values = tuple([self._number(value) for value in values])
         tracked = None if self._tracked is None else self._number(arguments[self._tracked])
         return self._route(body, values, tracked)  # type: ignore[arg-type]
+
+    def _named(self, arguments: tuple[Argument, ...]) -> BodyKey:
+        """The body that the arguments name."""
+        if self._place is not None:
+            known = self._bodies.get(text := arguments[self._place])
+            if known is not None and type(text) is str:
+                return known
+        given = {word: arguments[i] for i, word in self._keys}
+        body = self._key_of(self._groups | given if self._groups else given, self._where)
+        if self._place is not None and len(self._bodies) < MOST_KNOWN:
+            self._bodies[arguments[self._place]] = body
+        return body
 
     def _route(self, body: BodyKey, values: Numbers, tracked: float | None) -> Route:
         match self._field:

@@ -2,7 +2,6 @@
 
 import math
 import time
-from dataclasses import replace
 from typing import Any, Final
 
 import zmq
@@ -56,7 +55,7 @@ class BodyMessages:
             return
         self._rate_limiter.good(source)
         t_s = self._time(source, frame.t_s, now_s)
-        self._intake.accept(frame if t_s == frame.t_s else replace(frame, t_s=t_s))
+        self._intake.accept(frame if t_s == frame.t_s else frame._replace(t_s=t_s))
 
     def _time(self, source: str, t_s: float, now_s: float) -> float:
         """The time of a frame: its `t`, or its arrival if the sender's `t` is no running clock."""
