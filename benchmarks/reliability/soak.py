@@ -6,8 +6,8 @@ and the metrics are read; every five minutes a recording of 30 s is made. Memory
 server and of its page's process, sampled every ten seconds. A line is fitted to each after a warm-up. The uncertainty
 of the line comes from averages over a minute, because neighbouring samples are correlated.
 
-It needs Chromium and Linux. The browser draws in software here, which a graphics card does elsewhere; therefore it only
-gets the processor time that the others leave (`chrt --idle`).
+It needs Chromium and Linux. The browser draws in software here, which a graphics card does elsewhere, so it runs at a
+lower priority (`nice -n 15`).
 """
 
 import argparse
@@ -77,7 +77,7 @@ def soak(seconds: float, chromium: str) -> tuple[list[Sample], dict, Heard]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         wrapper = folder / "chromium"
-        wrapper.write_text(f'#!/bin/sh\nexec chrt --idle 0 {chromium} "$@"\n')
+        wrapper.write_text(f'#!/bin/sh\nexec chrt --other 0 nice -n 15 {chromium} "$@"\n')
         wrapper.chmod(0o755)
         options = ("--demo", "--metrics-port", "0", "--takes", str(folder / "takes"))
         with serving(*options) as server, browsing(str(wrapper), server.addresses["page"], folder / "browser") as page:

@@ -74,6 +74,8 @@ def test_status_tells_the_health_of_every_body_and_hand(stage: Stage) -> None:
     actor = status["actors"]["actor"]
     assert set(actor["bodies"]) == {"left_wrist", "right_wrist", "Box"}
     assert actor["bodies"]["Box"]["rate_hz"] == pytest.approx(120.0, rel=0.01)
+    assert 0.0 <= actor["bodies"]["Box"]["noise_m"] < 1e-5
+    assert 0.0 <= actor["bodies"]["Box"]["noise_rad"] < 1e-4
     assert actor["hands"]["left"]["state"] in ("live", "hold", "rest")
     assert status["counters"]["frames_in"]["zmq"] > 100
     assert 0.0 < status["delay_ms"]["p50"] <= status["delay_ms"]["max"]

@@ -28,7 +28,7 @@ mesh = {str(LIBRARY_FOLDER / "cube.ply")!r}
 solver = "none"
 """
     )
-    angles = {"least_squares": angles_of(stage)}
+    angles = {"wrench": angles_of(stage)}
     for solver, options in (("ccd", ("--solver", "ccd")), ("none", ())):
         with serving("--rig", str(rig), "--model", str(tiny_bundle), *options) as server:
             another = Stage(server)
@@ -36,5 +36,5 @@ solver = "none"
             assert named == {solver}
             angles[solver] = angles_of(another)
             another.close()
-    for one, other in (("ccd", "least_squares"), ("none", "ccd"), ("none", "least_squares")):
+    for one, other in (("ccd", "wrench"), ("none", "ccd"), ("none", "wrench")):
         assert np.abs(angles[one] - angles[other]).max() > np.radians(1.0), f"{one} and {other} make the same hands"

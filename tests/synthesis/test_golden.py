@@ -42,7 +42,7 @@ STRAY_RAYS = 3
 def compute(bundle: Bundle, cache: Path, count: int = TICKS) -> dict[str, np.ndarray]:
     """The features and hands of the first `count` ticks, by name, `(count, hands, …)`."""
     shapes = [build_shape(gourd(triangles), cache) for triangles in (2000, 300)]
-    synthesizer = Synthesizer(bundle)
+    synthesizer = Synthesizer(bundle, solver="least_squares")
     states = [synthesizer.rest_state() for _ in range(3)]
     ticks: list[dict[str, list[np.ndarray]]] = []
     for tick in range(count):

@@ -30,6 +30,7 @@ def compile_aside() -> None:
     from manipnet.synthesis.synthesizer import HandScene, windows_of
     from manipnet.tracking.forecast import damped_velocity
     from manipnet.tracking.pose_buffer import PoseBuffer, sample
+    from manipnet.tracking.smoothing import Smoothing
 
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     scene = HandScene("right", still, still, still, build_shape(load_library_mesh("cube")))
@@ -39,7 +40,8 @@ def compile_aside() -> None:
     track, angles = PoseBuffer(), np.zeros(hand.angle_count)
     for t_s in (0.0, 0.1):
         track.add(t_s, still[0])
-    sample([track], np.linspace(-0.5, 0.5, 21), 0.0, 0.1, damped_velocity)
+    smoothing = Smoothing(share=1.0, noise=1.0, half_width_s=0.2)
+    sample([track], np.linspace(-0.5, 0.5, 21), 0.0, 0.1, damped_velocity, smoothing)
     keep_angles(angles, hand.limits.copy(), angles, 1.0, np.empty_like(angles))
     pose_in_world(hand, ["right"], angles[None], still[:1], 1.0)
 

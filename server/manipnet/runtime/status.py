@@ -115,7 +115,7 @@ def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
 def bodies_report(
     names: Iterable[str], keys: Mapping[str, BodyKey], healths: Mapping[str, BodyHealth]
 ) -> dict[str, dict[str, Any]]:
-    """For each wrist and prop: its body, its state, the age of its newest tracked sample, and its rate."""
+    """For each wrist and prop: its body, its state, the age of its newest tracked sample, its rate, and its noise."""
     never_tracked = dict.fromkeys(names, BodyHealth(math.nan, math.inf))
     return {
         name: {
@@ -123,6 +123,8 @@ def bodies_report(
             "state": state_at_age(health.age_s),
             "age_s": _finite(health.age_s),
             "rate_hz": _finite(health.rate_hz),
+            "noise_m": health.noise.position_m,
+            "noise_rad": health.noise.rotation_rad,
         }
         for name, health in (never_tracked | dict(healths)).items()
     }

@@ -68,7 +68,8 @@ def pose_a_hand(bundle: Bundle, solver: str = DEFAULT_SOLVER) -> None:
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:
-    swing = 0.02 * float(np.sin(2.0 * np.pi * t_s))
+    tremor = 0.002 * float(np.sin(1e5 * t_s))  # enough for the bodies to be smoothed
+    swing = 0.02 * float(np.sin(2.0 * np.pi * t_s)) + tremor
     bodies = (
         BodySample(None, "left_wrist", (0.15, swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),
         BodySample(None, "right_wrist", (-0.15, -swing, 0.05), (0.0, 0.0, 0.0, 1.0), True),

@@ -1,13 +1,16 @@
 """The recent poses of one streamed body, and their interpolation by time."""
 
-from collections.abc import Callable, Sequence
-from typing import Final
+from collections.abc import Sequence
+from typing import Final, Protocol
 
 import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.jit import inner, kernel
 from manipnet.synthesis.rotations import slerp_into
+from manipnet.tracking.forecast import FIT_S
+from manipnet.tracking.noise import UNKNOWN, Noise, estimate_noise
+from manipnet.tracking.smoothing import Smoothing, smooth
 
 KEEP: Final = 1024
 """Number of newest samples that are kept: more than 2 s at the highest accepted rate."""
@@ -15,9 +18,26 @@ MIN_SPACING_S: Final = 0.0015
 """A sample closer than this to another one is a duplicate, because no tracker is that fast."""
 TIME_TOLERANCE_S: Final = 1e-6
 """Two times this close are the same instant, because times are sums of rounded fractions."""
+NOISE_EVERY_S: Final = 0.25
+"""How often the noise of a body is estimated again."""
+FORGET_S: Final = 1.0
+"""The noise of a body that has been lost for this long no longer counts."""
+HISTORY_STEPS: Final = np.linspace(-1.0, 0.0, 5)
+"""Instants of the smoothed history that is given to a forecast, from its start to its end."""
 
-Forecast = Callable[[Array, Array, Array], Array]
-"""`(history times (m,), history poses (m, 7), times (n,)) -> poses (n, 7)`; the history ends before the times."""
+
+class Forecast(Protocol):
+    """Continues a motion beyond its history."""
+
+    def __call__(
+        self, times_s: Array, poses: Array, future_s: Array, fit_s: float = ..., doubt: float = ..., /
+    ) -> Array:
+        """From poses `(m, 7)` at `times_s (m,)` to poses `(n, 7)` at `future_s (n,)`, which are not before the last.
+
+        The last `fit_s` of the history are the current motion. If the tracker was noisy, they are longer than usual,
+        and a `doubt` up to 1 says that slow motion may be noise.
+        """
+        ...
 
 
 class PoseBuffer:
@@ -29,6 +49,9 @@ class PoseBuffer:
         self._count = 0
         self.seen_s = -np.inf
         """Newest instant at which the body was in a frame, tracked or not."""
+        self.noise = UNKNOWN
+        """The noise of the newest samples."""
+        self._estimated_s = -np.inf
 
     @property
     def times(self) -> Array:
@@ -60,6 +83,8 @@ class PoseBuffer:
         self._times[at], self._poses[at] = t_s, pose
         self._count += 1
         self._align(at)
+        if t_s - self._estimated_s >= NOISE_EVERY_S:
+            self._estimated_s, self.noise = t_s, estimate_noise(self.times, self.poses)
         return True
 
     def interval_s(self) -> float:
@@ -71,6 +96,10 @@ class PoseBuffer:
         """Time since the newest tracked sample at or before `t_s`; infinite if there is none."""
         before = int(np.searchsorted(self.times, t_s + TIME_TOLERANCE_S))
         return max(t_s - float(self._times[before - 1]), 0.0) if before else np.inf
+
+    def noise_at(self, t_s: float) -> Noise:
+        """The noise of the newest samples, which is unknown if the body has been lost for long at `t_s`."""
+        return self.noise if self._count and t_s - self._times[self._count - 1] < FORGET_S else UNKNOWN
 
     def _align(self, at: int) -> None:
         """Keep neighbouring quaternions in one hemisphere, because trackers may flip their signs."""
@@ -88,22 +117,46 @@ class PoseBuffer:
 
 
 def sample(
-    tracks: Sequence[PoseBuffer], times_s: Array, present_s: float, until_s: float, forecast: Forecast | None
+    tracks: Sequence[PoseBuffer],
+    times_s: Array,
+    present_s: float,
+    until_s: float,
+    forecast: Forecast | None,
+    smoothing: Smoothing | None = None,
 ) -> tuple[Array, list[float]]:
     """World poses `(len(tracks), n, 7)` of non-empty tracks at rising `times_s (n,)`, and their ages at `present_s`.
 
     Positions are interpolated linearly and rotations on the shortest arc. Only samples up to `until_s` are used, and
     the one that brackets it. Before the first sample, its pose stands; after the last one, `forecast` continues the
-    motion, or the last pose stands if there is no `forecast`.
+    motion, or the last pose stands if there is no `forecast`. With `smoothing`, poses and forecast are those of the
+    smoothed motion.
     """
     poses, ages = np.empty((len(tracks), len(times_s), 7)), []
     for row, track in zip(poses, tracks, strict=True):
         known, age_s = _resample(track.times, track.poses, times_s, present_s, until_s, row)
         ages.append(age_s)
-        if forecast is not None and times_s[-1] > (last_s := track.times[known - 1] + TIME_TOLERANCE_S):
-            beyond = int(np.searchsorted(times_s, last_s, side="right"))
-            row[beyond:] = forecast(track.times[:known], track.poses[:known], times_s[beyond:])
+        samples = track.times[:known], track.poses[:known]
+        if smoothing is not None:
+            smooth(*samples, smoothing, times_s, row)
+        if forecast is None or times_s[-1] <= (last_s := track.times[known - 1] + TIME_TOLERANCE_S):
+            continue
+        beyond = int(np.searchsorted(times_s, last_s, side="right"))
+        if smoothing is None:
+            row[beyond:] = forecast(*samples, times_s[beyond:])
+        else:
+            fit_s = FIT_S + smoothing.share * (smoothing.half_width_s - FIT_S)
+            history = _smoothed_history(*samples, smoothing, fit_s)
+            row[beyond:] = forecast(*history, times_s[beyond:], fit_s, smoothing.share)
     return poses, ages
+
+
+def _smoothed_history(times_s: Array, poses: Array, smoothing: Smoothing, length_s: float) -> tuple[Array, Array]:
+    """The newest moments of a motion as evenly spaced samples: their times `(n,)` and poses `(n, 7)`."""
+    at_s = times_s[-1] + length_s * HISTORY_STEPS
+    smoothed = np.empty((len(at_s), 7))
+    _resample(times_s, poses, at_s, at_s[-1], at_s[-1], smoothed)
+    smooth(times_s, poses, smoothing, at_s, smoothed)
+    return at_s, smoothed
 
 
 @inner

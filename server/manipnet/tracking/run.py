@@ -58,7 +58,10 @@ class Run:
     def health(self, now_s: float) -> dict[str, BodyHealth]:
         """How every body of this run arrives."""
         clock_s = self.arrivals.clock_s(now_s)
-        return {name: BodyHealth(1.0 / track.interval_s(), track.age_s(clock_s)) for name, track in self.tracks.items()}
+        return {
+            name: BodyHealth(1.0 / track.interval_s(), track.age_s(clock_s), track.noise)
+            for name, track in self.tracks.items()
+        }
 
     def recent(self, name: str, seconds: float) -> Array:
         """Tracked poses `(n, 7)` of a body in the newest `seconds` of the run, oldest first."""

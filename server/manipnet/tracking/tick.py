@@ -6,7 +6,9 @@ from typing import Final
 
 from manipnet.geometry import Array
 from manipnet.synthesis.model.layout import PRESENT, WINDOW_OFFSETS_S
+from manipnet.tracking.noise import UNKNOWN, Noise
 from manipnet.tracking.pose_buffer import TIME_TOLERANCE_S, Forecast, PoseBuffer, sample
+from manipnet.tracking.smoothing import Smoothing
 
 TICK_HZ: Final = 60
 TICK_S: Final = 1.0 / TICK_HZ
@@ -32,10 +34,14 @@ class BodyAtTick:
 
 @dataclass(frozen=True, slots=True)
 class BodyHealth:
-    """How a body arrives: the rate of its tracked samples, and the age of the newest one by the stream's clock."""
+    """How a body arrives: the rate of its tracked samples, the age of the newest one, and their noise.
+
+    The age is by the stream's clock.
+    """
 
     rate_hz: float
     age_s: float
+    noise: Noise = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +62,11 @@ class Tick:
 
 
 def bodies_at(
-    time_s: float, until_s: float, tracks: Mapping[str, PoseBuffer], forecast: Forecast | None
+    time_s: float,
+    until_s: float,
+    tracks: Mapping[str, PoseBuffer],
+    forecast: Forecast | None,
+    smoothing: Smoothing | None = None,
 ) -> dict[str, BodyAtTick]:
     """The bodies as they are seen from the instant `time_s`, from samples up to `until_s`.
 
@@ -65,7 +75,7 @@ def bodies_at(
     tracked = {name: track for name, track in tracks.items() if len(track.times)}
     if not tracked:
         return {}
-    windows, ages = sample(list(tracked.values()), time_s + WINDOW_OFFSETS_S, time_s, until_s, forecast)
+    windows, ages = sample(list(tracked.values()), time_s + WINDOW_OFFSETS_S, time_s, until_s, forecast, smoothing)
     return {
         name: BodyAtTick(window, window[PRESENT], age_s, bool(time_s <= track.times[-1] + TIME_TOLERANCE_S))
         for (name, track), window, age_s in zip(tracked.items(), windows, ages, strict=True)

@@ -50,6 +50,7 @@ from manipnet.tracking.rewind import Rewind
 from manipnet.tracking.run import Run
 from manipnet.tracking.schedule import Schedule
 from manipnet.tracking.sender_handover import CLOCK, SenderHandover
+from manipnet.tracking.smoothing import Smoother
 from manipnet.tracking.tick import TICK_HZ, BodyHealth, Poses, Tick, bodies_at
 
 MAX_BACKLOG: Final = 120
@@ -70,6 +71,7 @@ class Timeline:
         self._schedule = Schedule(look_ahead_s)
         self._rewind = Rewind(self._schedule)
         self._senders, self._jumps = SenderHandover(), ClockJumps()
+        self._smoother = Smoother()
 
     @property
     def look_ahead_s(self) -> float:
@@ -193,7 +195,9 @@ class Timeline:
         time_s, due_s = run.tick_s(run.next_index), self._schedule.due_s(run, run.next_index)
         silent = due_s > run.arrivals.newest_s + TIME_TOLERANCE_S
         # A sender that has stopped is not forecast; its last pose stands.
-        bodies = bodies_at(time_s, due_s, run.tracks, None if silent else self._forecast)
+        forecast = None if silent else self._forecast
+        smoothing = self._smoother.follow(track.noise_at(time_s) for track in run.tracks.values())
+        bodies = bodies_at(time_s, due_s, run.tracks, forecast, smoothing)
         return Tick(
             run=run.number,
             index=run.next_index,

@@ -20,7 +20,8 @@ from manipnet.synthesis.ik.grip import (
     take_pose,
     unpack_grip,
 )
-from manipnet.synthesis.ik.holding import Hands, improve_grips
+from manipnet.synthesis.ik.holders import Hands
+from manipnet.synthesis.ik.holding import improve_grips
 from manipnet.synthesis.model.features import Windows
 from manipnet.synthesis.model.layout import PRESENT
 from manipnet.synthesis.model.shipped import shipped_hand

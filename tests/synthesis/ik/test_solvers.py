@@ -12,7 +12,7 @@ from manipnet.geometry import compose, quat_exp
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.ik.ccd import solve_ccd
 from manipnet.synthesis.ik.chains import Surface
-from manipnet.synthesis.ik.grasp import finger_confidences_into, grasp_confidence
+from manipnet.synthesis.ik.grasp import finger_confidences_into, grasp_confidence, slip_and_rest
 from manipnet.synthesis.ik.least_squares import solve_least_squares
 from manipnet.synthesis.ik.targets import mix_distances, place_targets
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -34,11 +34,12 @@ def ball(tmp_path_factory):
     return build_shape(closed_mesh(mesh.vertices, mesh.faces, "ball"), tmp_path_factory.mktemp("cache"))
 
 
-def solve_beside(ball, predicted, targets, confidence, center, angles):
+def solve_beside(ball, predicted, targets, confidence, center, angles, clear_m=0.0):
     """Least squares with the ball at `center` of the wrist frame, from `angles` to better ones there."""
     surface = Surface(ball.field, np.eye(3), -center, 1.0)
     hand, grip = (HAND.skeleton, HAND.chains), (np.zeros(5), np.zeros(20))
-    call(solve_least_squares, *hand, predicted, targets, NOT_TOUCHING, confidence, HAND.limits, surface, *grip, angles)
+    surely = NOT_TOUCHING, confidence, clear_m
+    call(solve_least_squares, *hand, predicted, targets, *surely, HAND.limits, surface, *grip, angles)
 
 
 def solve(name, ball, angles, targets, center=FAR):
@@ -142,6 +143,15 @@ def test_an_object_that_rests_or_moves_by_itself_is_not_held():
     assert call(grasp_confidence, STILL, compose(STILL, np.tile(BESIDE, (21, 1))), CLOSE) == 0.0
 
 
+@pytest.mark.parametrize(("speed", "turn"), [(0.3, 0.0), (0.02, 3.0)])
+def test_a_hand_that_passes_an_object_at_rest_slips(speed, turn):
+    wrist = carried(speed, turn)
+    assert call(slip_and_rest, wrist, STILL) == (1.0, 1.0)
+    assert call(slip_and_rest, wrist, compose(wrist, np.tile(BESIDE, (21, 1)))) == (0.0, 0.0)
+    assert call(slip_and_rest, STILL, compose(wrist, np.tile(BESIDE, (21, 1)))) == (1.0, 0.0)
+    assert call(slip_and_rest, STILL, STILL) == (0.0, 1.0)
+
+
 def test_what_moves_in_one_hand_while_the_other_is_far_is_held():
     far = CLOSE + np.array([0.0, 0.3, 0.0])
     moving = carried(0.3, 0.5)
@@ -173,6 +183,19 @@ def test_a_hand_that_holds_closes_on_the_object(ball):
         gaps.append(fingertip_gaps(forward_kinematics(HAND, angles)[0], center).min())
     assert gaps[0] > 0.008
     assert -0.008 < gaps[1] < 0.002
+
+
+def test_a_hand_that_is_to_keep_clear_does(ball):
+    predicted = np.zeros(20)
+    targets, _ = forward_kinematics(HAND, predicted)
+    center = targets[19] + np.array([0.0, 0.0, -0.038])
+    touching, clear = predicted.copy(), predicted.copy()
+    solve_beside(ball, predicted, targets, 0.0, center, touching)
+    solve_beside(ball, predicted, targets, 0.0, center, clear, clear_m=0.010)
+    near, far = (fingertip_gaps(forward_kinematics(HAND, angles)[0], center).min() for angles in (touching, clear))
+    assert near < 0.002
+    assert 0.005 < far < 0.010
+    np.testing.assert_allclose(clear[:4], touching[:4], atol=1e-3, err_msg="the thumb is far away and stays")
 
 
 def test_a_finger_deep_in_the_object_comes_out_on_the_side_it_entered(ball):

@@ -23,7 +23,7 @@ from manipnet_tools.evaluation.realism import CEILING, FLOOR, realism
 from manipnet_tools.evaluation.results import CAPTURED, HOLD, MEAN, NEAREST, Fold
 from manipnet_tools.evaluation.roll_outs import baseline_rows, evaluate, folds, model_rows
 from manipnet_tools.evaluation.sheet import write_sheet
-from manipnet_tools.evaluation.sweeps import noise, scale
+from manipnet_tools.evaluation.sweeps import noise, scale, tracked
 from manipnet_tools.takes.dataset import DataError
 
 HAND = shipped_hand()
@@ -171,12 +171,16 @@ def test_a_sweep_is_plotted(results, tmp_path):
 
 def test_a_sweep_changes_the_input_and_not_the_truth(cases, manipnet_data):
     from manipnet_tools.takes.take import read_take
+    from manipnet_tools.takes.tracker import Tracker
 
     take, case = read_take(manipnet_data / "BVH" / "mug1"), cases["mug1"]
-    shaken = noise(0.001, 0.0)(take, case)
+    shaken = noise(0.0001, 0.0)(take, case)
     moved = shaken.inputs["left"].wrist[..., :3] - case.inputs["left"].wrist[..., :3]
-    assert np.std(moved) == pytest.approx(0.001, rel=0.02)
-    assert shaken.captured is case.captured
+    assert np.std(moved) == pytest.approx(0.0001, rel=0.02)
+    np.testing.assert_array_equal(shaken.captured["left"], case.captured["left"])
+    other = tracked(Tracker(rate_hz=90.0), 0.1)(take, case)
+    assert len(case) - 2 <= len(other) <= len(case)
+    assert len(other.inputs["left"]) == len(other.captured["left"]) == len(other)
     larger = scale(1.4)(take, case)
     assert larger.inputs["right"].scale == 1.4
     np.testing.assert_allclose(larger.shape.bounds, 1.4 * case.shape.bounds, atol=1e-9)

@@ -72,16 +72,17 @@ def _model_sources(options: EvaluateOptions) -> dict[str, Source]:
 def _sweep(options: EvaluateOptions, name: Sweep, progress: Progress) -> tuple[dict[str, Any], list[Table]]:
     from manipnet_tools.evaluation import sweeps
 
-    bundle = load_bundle(options.model[0])
-    subjects = sweeps.load_subjects(options.data, options.takes)
+    model, of_fold = next(iter(_models(options).items()))
+    subjects = sweeps.load_subjects(options.data, options.protocol, options.takes, of_fold)
     task = progress.add_task(name, total=sweeps.hand_ticks(name, subjects))
-    steps = sweeps.sweep(name, subjects, bundle, options.solver[0], lambda n: progress.advance(task, n))
+    steps = sweeps.sweep(name, subjects, options.solver[0], lambda n: progress.advance(task, n))
     rows = dict(steps)
     if options.plots:
         from manipnet_tools.evaluation import plots
 
         progress.console.print(f"wrote {plots.write_sweep(name, rows, options.plots)}")
-    title = f"{name}: {row_name(bundle.name, options.solver[0])}, last 20 % of {len(subjects)} takes"
+    tested = "last 20 % of" if options.protocol == "seen" else "all of"
+    title = f"{name}: {row_name(model, options.solver[0])}, {tested} {len(subjects)} takes"
     return {"sweep": name, "rows": report.plain(rows)}, [report.table_of(title, rows)]
 
 

@@ -14,7 +14,7 @@ from manipnet_tools.training.config import TrainConfig
 EvaluationProtocol = Literal["seen", "unseen"]
 """seen: the last fifth of every take. unseen: each take with a model that has not seen its object."""
 PROTOCOLS: Final[tuple[EvaluationProtocol, ...]] = ("seen", "unseen")
-Sweep = Literal["noise", "look-ahead", "resolution", "scale", "loop"]
+Sweep = Literal["noise", "tracker", "look-ahead", "resolution", "scale", "loop"]
 
 MeasureGroup = Literal["scores", "drop", "realism"]
 """scores: joint error, contacts, penetration, motion and physics. drop: the drop test. realism: whether a classifier
@@ -49,8 +49,8 @@ class EvaluateOptions:
     fingers: tuple[str, ...] = ()
     """Judge files of `manipnet synthesize` (TAKE=FILE.npz) instead of models. Only the takes named here are tested."""
     sweep: Sweep | None = None
-    """Evaluate instead how the last 20 % of each take changes with noise, a shorter look-ahead, other meshes, objects
-    of other sizes, or over ten minutes."""
+    """Evaluate instead how the hands of the first model change with noise, other tracking systems, a shorter
+    look-ahead, other meshes, objects of other sizes, or over ten minutes."""
     json: Path | None = None
     """Write every figure to this file."""
     sheet: Path | None = None
@@ -64,7 +64,7 @@ class EvaluateOptions:
         take_folders(self.data, self.takes)
         for solver in self.solver:
             solver_named(solver)
-        if self.protocol == "seen" or self.sweep:
+        if self.protocol == "seen":
             for model in self.model:
                 find_bundle(model)
         require_folder_of(self.json, "--json")

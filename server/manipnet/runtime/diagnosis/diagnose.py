@@ -1,10 +1,11 @@
-"""The whole diagnosis: sockets, senders, what was dropped, what is not understood, and each wrist and prop."""
+"""The whole diagnosis: sockets, senders, what was dropped or not understood, and each wrist and prop."""
 
 from collections.abc import Iterator
 
 from manipnet.runtime.diagnosis.drops import of_drops, of_refused
 from manipnet.runtime.diagnosis.finding import Finding, Report
 from manipnet.runtime.diagnosis.motive import of_motive
+from manipnet.runtime.diagnosis.noise import of_noise
 from manipnet.runtime.diagnosis.parts import of_parts
 from manipnet.runtime.diagnosis.senders import of_senders
 
@@ -17,7 +18,7 @@ def diagnose(report: Report) -> list[Finding]:
     findings += [*of_refused(report), *of_drops(report), *of_senders(report)]
     if not report.get("senders") and not any(finding.level == "problem" for finding in findings):
         findings.append(_nothing(report))
-    return findings + of_parts(report)
+    return [*findings, *of_parts(report), *of_noise(report)]
 
 
 def _of_sockets(report: Report) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from manipnet.jit import inner, matrix, stack_array, vector
 from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Chains, Skeleton
 from manipnet.synthesis.ik.ccd import solve_ccd
 from manipnet.synthesis.ik.chains import Surface, clamp
-from manipnet.synthesis.ik.grasp import grasp_confidence
+from manipnet.synthesis.ik.grasp import grasp_confidence, slip_and_rest
 from manipnet.synthesis.ik.grip import Grip
 from manipnet.synthesis.ik.least_squares import solve_least_squares
 from manipnet.synthesis.ik.targets import place_targets
@@ -22,6 +22,9 @@ from manipnet.synthesis.sensing.scene import object_from_wrist
 _targets, _reference = stack_array(MAX_JOINTS, 3), stack_array(MAX_ANGLES)
 FADE_SHARE = 0.6
 """Share of the way to a new correction that one tick goes, so that fingers do not pop."""
+
+CLEAR_M = 0.010
+"""How far the fingers keep away from an object that the hand passes."""
 
 
 class Problem(NamedTuple):
@@ -81,6 +84,7 @@ def correct_by_least_squares(problem: Problem, angles: Array, correction: Array)
         targets,
         problem.distances,
         confidence,
+        0.0,
         problem.limits,
         surface,
         problem.grip.weights,
@@ -92,10 +96,13 @@ def correct_by_least_squares(problem: Problem, angles: Array, correction: Array)
 
 @inner
 def correct_by_wrench(problem: Problem, angles: Array, correction: Array):
-    """Damped least squares in which fingers that carry the object have poses of their own."""
+    """Damped least squares in which fingers that carry the object have poses of their own, and those of a hand that
+    passes it keep clear of it."""
     rotation, translation, targets, reference = matrix(), vector(), _targets(), _reference()
     surface = _place_surface(problem, rotation, translation, targets)
+    slips, rests = slip_and_rest(problem.wrist, problem.object)
     confidence = grasp_confidence(problem.wrist, problem.object, problem.other_wrist)
+    clear_m = CLEAR_M * slips * max(rests, 1.0 - confidence)
     grip = problem.grip
     for angle in range(len(angles)):
         reference[angle] = clamp(problem.predicted[angle] + grip.offsets[angle], problem.limits, angle)
@@ -108,6 +115,7 @@ def correct_by_wrench(problem: Problem, angles: Array, correction: Array):
         targets,
         problem.distances,
         confidence,
+        clear_m,
         problem.limits,
         surface,
         grip.weights,

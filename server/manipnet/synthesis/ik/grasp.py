@@ -9,7 +9,7 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.jit import inner, matrix, stack_array, vector
 from manipnet.synthesis.hand.hand import CHAIN_LENGTH, Chains
-from manipnet.synthesis.model.layout import PRESENT
+from manipnet.synthesis.model.layout import PRESENT, WINDOW_STEP_S
 from manipnet.synthesis.rotations import quat_to_matrix_into
 
 ARM_M = 0.05
@@ -24,6 +24,10 @@ HELPS_M, ALONE_M = 0.15, 0.25
 """Distance of the other wrist from the object at which it may hold it, and at which it surely does not."""
 TAKES_PART_M = 0.010
 """A finger predicted to be this much farther from the object than the nearest one takes no part in the grasp."""
+SLOW_M_S, FAST_M_S = 0.05, 0.12
+"""Speeds of the object in the hand at which it surely does not slip, and surely does."""
+RESTS_M_S, MOVES_M_S = 0.03, 0.06
+"""Speeds of the object in the world at which it surely rests, and surely moves."""
 _POINTS = 4
 _points = stack_array(_POINTS, 3)
 
@@ -91,3 +95,36 @@ def finger_confidences_into(chains: Chains, distances: Array, confidence: float,
     out[0] = confidence
     for finger in range(1, fingers):
         out[finger] = confidence * min(max(1.0 - (out[finger] - nearest) / TAKES_PART_M, 0.0), 1.0)
+
+
+@inner
+def slip_and_rest(wrist: Array, obj: Array):
+    """How certain it is, each 0 to 1, that the object moves in the hand, and that it rests in the world.
+
+    A wrist that passes an object at rest, or moves away from it, does not hold it at this moment. The poses `(21, 7)`
+    are looked at 50 ms to either side of the present.
+    """
+    turn, before = matrix(), vector()
+    seen_moved = moved = near = far = 0.0
+    for t in (PRESENT - 1, PRESENT + 1):
+        quat_to_matrix_into(wrist[t, 3:], turn)
+        for i in range(3):
+            seen = 0.0
+            for j in range(3):
+                seen += turn[j, i] * (obj[t, j] - wrist[t, j])
+            if t < PRESENT:
+                before[i] = seen
+            else:
+                seen_moved += (seen - before[i]) ** 2
+    for i in range(7):
+        change = (obj[PRESENT + 1, i] - obj[PRESENT - 1, i]) ** 2
+        if i < 3:
+            moved += change
+        else:
+            near += change
+            far += (obj[PRESENT + 1, i] + obj[PRESENT - 1, i]) ** 2
+    speed = np.sqrt(seen_moved) / (2.0 * WINDOW_STEP_S)
+    world = (np.sqrt(moved) + 2.0 * ARM_M * np.sqrt(min(near, far))) / (2.0 * WINDOW_STEP_S)
+    slips = min(max((speed - SLOW_M_S) / (FAST_M_S - SLOW_M_S), 0.0), 1.0)
+    rests = min(max((MOVES_M_S - world) / (MOVES_M_S - RESTS_M_S), 0.0), 1.0)
+    return slips, rests

@@ -27,6 +27,8 @@ GRIP_WEIGHT_M2 = 4e-3
 """The same for the angles of a finger that has a pose of its own, because it carries."""
 ANCHOR_WEIGHT = 1.5
 """Pull of a fingertip toward the place where it touched the object."""
+CLEAR_WEIGHT = 2.0
+"""Push on the fingers of a hand that is to keep clear of the object, until they do."""
 ALLOWED_DEPTH_M = 0.002
 """Skin gives way: the captured fingers are about this deep where they press."""
 PULL_WEIGHT = 3.0
@@ -137,11 +139,15 @@ def _add_surface(
     axes: Array,
     distances: Array,
     confidence: float,
+    clear_m: float,
     surface: Surface,
     normal: Array,
     slope: Array,
 ):
-    """Add the finger's capsules, pushed out of the object and pulled onto it, to its normal equations."""
+    """Add the finger's capsules, pushed out of the object and pulled onto it, to its normal equations.
+
+    They are pushed gently until they are `clear_m` away.
+    """
     row = _row()
     reach = PULL_REACH_M + confidence * (GRASP_REACH_M - PULL_REACH_M)
     for capsule in range(CHAIN_LENGTH):
@@ -156,7 +162,10 @@ def _add_surface(
             x, y, z, distance, gx, gy, gz = capsule_sample(chains, c, f, positions, surface)
             depth = radius - ALLOWED_DEPTH_M - distance
             weight = SURFACE_WEIGHT
-            if depth <= 0.0:
+            if -clear_m < depth <= 0.0:
+                depth += clear_m
+                weight = CLEAR_WEIGHT
+            elif depth <= 0.0:
                 weight = PULL_WEIGHT * touching * max(1.0 + depth / reach, 0.0) ** 2
                 if weight == 0.0:
                     continue
@@ -201,6 +210,7 @@ def solve_least_squares(
     targets: Array,
     distances: Array,
     confidence: float,
+    clear_m: float,
     limits: Array,
     surface: Surface,
     weights: Array,
@@ -210,7 +220,8 @@ def solve_least_squares(
     """From a first guess in `angles (A,)` to better ones there, inside `limits (A, 2)`.
 
     They stay near the angles `predicted (A,)`, bring joints to `targets (J, 3)`, keep fingers out of the object and
-    pull them onto it where the predicted `distances (J,)` or the `confidence` in a grasp say so. `weights (F,)` and
+    pull them onto it where the predicted `distances (J,)` or the `confidence` in a grasp say so, or keep them `clear_m`
+    away. `weights (F,)` and
     `anchors (F, 4)`, flat, are those of a `Grip`.
     """
     positions, rotations, axes = _positions(), _rotations(), _axes()
@@ -237,6 +248,7 @@ def solve_least_squares(
                 axes,
                 distances,
                 max(confidences[finger], weights[finger]),
+                clear_m,
                 surface,
                 normal,
                 slope,

@@ -18,7 +18,8 @@ from manipnet.synthesis.hand.kinematics import forward_kinematics_into
 from manipnet.synthesis.hand.packed import unpack_chains, unpack_skeleton
 from manipnet.synthesis.ik.correction import Problem, correct_nothing
 from manipnet.synthesis.ik.grip import grip_size, unpack_grip
-from manipnet.synthesis.ik.holding import Hands, leave_grips
+from manipnet.synthesis.ik.holders import Hands
+from manipnet.synthesis.ik.holding import leave_grips
 from manipnet.synthesis.ik.solvers import solver_named
 from manipnet.synthesis.model.decode import decode_into, unpack_output_columns
 from manipnet.synthesis.model.features import Windows

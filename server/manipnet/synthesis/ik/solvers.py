@@ -32,7 +32,7 @@ SOLVERS: Final = {
         ),
         Solver(
             "wrench",
-            "least squares, and contacts that can carry what is held",
+            "least squares with contacts that carry what is held",
             f"{_CORRECTION}:correct_by_wrench",
             "manipnet.synthesis.ik.holding:improve_grips",
         ),
@@ -41,7 +41,7 @@ SOLVERS: Final = {
     )
 }
 """Every solver by name."""
-DEFAULT_SOLVER: Final = "least_squares"
+DEFAULT_SOLVER: Final = "wrench"
 
 
 class UnknownSolverError(ValueError):
