@@ -7,7 +7,6 @@ times of the take.
 import argparse
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 from manipnet.inputs.playback import looped, play
@@ -20,7 +19,7 @@ def stamped(frames: list[BodyFrame]) -> Iterator[BodyFrame]:
     """Repeat the frames without end, each with the time at which it is due; the first is due at once."""
     start_s = time.monotonic()
     for frame in looped(frames):
-        yield replace(frame, t_s=start_s + frame.t_s - frames[0].t_s)
+        yield frame._replace(t_s=start_s + frame.t_s - frames[0].t_s)
 
 
 def main() -> None:

@@ -152,7 +152,7 @@ def _play(
         time.sleep(max(begin_s + frame.t_s - time.monotonic(), 0.0))
         bodies.send(msgpack.packb(bodies_map(frame)) or b"")
         sent += 1
-        stranger.act(replace(frame, t_s=frame.t_s + 1e4))
+        stranger.act(frame._replace(t_s=frame.t_s + 1e4))
         while hands.poll(0):
             messages.append(decode_msgpack(hands.recv()[len(TOPIC_MSGPACK) :]))
     time.sleep(0.5)
