@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from languages import run
 from manipnet_client import decode
-from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, matches
+from manipnet_client.retarget import BONES, FINGERS, PARTS, HandRig, is_hand, is_thumb_metacarpal, matches
 from random_hand import HAND, posed
 
 from manipnet.geometry import quat_conjugate, quat_exp, quat_multiply, quat_rotate
@@ -86,7 +86,37 @@ BONE_NAMES = {
     "mixamorig:RightHand": ("right", None, None),
     "hand_l": ("left", None, None),
     "hand.R": ("right", None, None),
+    "mixamorig_RightHandRing2": ("right", 3, 1),
+    "mixamorigLeftHand": ("left", None, None),
+    "DEF-f_middle.02.L": ("left", 2, 1),
+    "DEF-thumb.03.R": ("right", 0, 2),
+    "DEF-hand.R": ("right", None, None),
+    "LeftThumbMetacarpal": ("left", 0, 0),
+    "index2.r": ("right", 1, 1),
+    "thumb1.l": ("left", 0, 0),
+    "c_pinky3.l": ("left", 4, 2),
+    "c_hand_fk.r": ("right", None, None),
+    "CC_Base_L_Mid1": ("left", 2, 0),
+    "CC_Base_R_Hand": ("right", None, None),
+    "lMid2": ("left", 2, 1),
+    "r_ring3": ("right", 3, 2),
+    "rHand": ("right", None, None),
+    "Bip01 L Finger0": ("left", 0, 0),
+    "Bip01 R Finger42": ("right", 4, 2),
+    "Bip01 L Hand": ("left", None, None),
+    "left_pinky3": ("left", 4, 2),
+    "right_wrist": ("right", None, None),
+    "finger2-1.R": ("right", 1, 0),
+    "wrist.L": ("left", None, None),
+    "Thumb0_L": ("left", 0, 0),
+    "Thumb2_R": ("right", 0, 2),
+    "LittleFinger3_R": ("right", 4, 2),
+    "Left wrist": ("left", None, None),
+    "Thumb Intermediate.R": ("right", 0, 1),
+    "Ring Distal.L": ("left", 3, 2),
     "LeftForeArm": None,
+    "ring": None,
+    "Bip01 L Finger5": None,
     "index_metacarpal_l": None,
 }
 
@@ -102,6 +132,13 @@ def test_bone_names_in_python():
             if matches(name, s, f, p)
         ]
         assert found == ([meaning] if meaning else []), name
+
+
+def test_a_thumb_with_a_metacarpal_bone_is_counted_from_there():
+    bones = ["LeftThumbMetacarpal", "LeftThumbProximal", "LeftThumbDistal"]
+    assert any(is_thumb_metacarpal(bone, "left") for bone in bones)
+    for part in range(3):
+        assert [bone for bone in bones if matches(bone, "left", 0, part, thumb_metacarpal=True)] == [bones[part]]
 
 
 def test_bone_names_in_csharp(harness):

@@ -7,11 +7,26 @@ import numpy as np
 from .axes import to_blender, turned_to_blender
 from .manipnet_client import Hand
 from .manipnet_client.layout import JOINT_NAMES
-from .manipnet_client.retarget import FINGERS, PARTS, HandRig, conjugate, is_hand, matches, multiply, rotate
+from .manipnet_client.retarget import (
+    FINGERS,
+    PARTS,
+    HandRig,
+    conjugate,
+    is_hand,
+    is_thumb_metacarpal,
+    matches,
+    multiply,
+    rotate,
+)
 
 
 class RigError(ValueError):
     """An armature has no known fingers; the text names the missing bones."""
+
+
+def _is_driven(bone_name: str) -> tuple[bool, bool]:
+    """Rigify's deforming bones follow its controls, and so do those of Auto-Rig Pro, whose controls begin with c_."""
+    return bone_name.startswith("DEF-"), not bone_name.startswith("c_")
 
 
 class ArmatureHand:
@@ -19,10 +34,11 @@ class ArmatureHand:
 
     def __init__(self, armature: bpy.types.Object, side: str, follow_wrist: bool) -> None:
         self._armature, self._side, self._follow_wrist = armature, side, follow_wrist
-        bones = {bone.name: bone for bone in armature.data.bones}
+        bones = {bone.name: bone for bone in sorted(armature.data.bones, key=lambda bone: _is_driven(bone.name))}
+        metacarpal = any(is_thumb_metacarpal(name, side) for name in bones)
         hand = next((name for name in bones if is_hand(name, side)), None)
         names = [
-            next((name for name in bones if matches(name, side, finger, part)), None)
+            next((name for name in bones if matches(name, side, finger, part, metacarpal)), None)
             for finger in range(len(FINGERS))
             for part in range(len(PARTS))
         ]

@@ -80,15 +80,19 @@ namespace ManipNet.Client.Unity
             bool humanoid = animator != null && animator.isHuman;
             Transform[] all = humanoid ? new Transform[0] : (root != null ? root : animator.transform).GetComponentsInChildren<Transform>(true);
             _hand = humanoid ? animator.GetBoneTransform(side == Side.Left ? HumanBodyBones.LeftHand : HumanBodyBones.RightHand) : null;
+            bool metacarpal = false;
             foreach (Transform t in all)
+            {
                 if (RigNames.IsHand(t.name, side)) _hand = t;
+                metacarpal |= RigNames.IsThumbMetacarpal(t.name, side);
+            }
             if (_hand == null) missing.Add("Hand");
             for (int i = 0; i < _bones.Length; i++)
             {
                 int finger = i / 3, part = i % 3;
                 _bones[i] = humanoid ? animator.GetBoneTransform(HumanBone(i)) : null;
                 foreach (Transform t in all)
-                    if (RigNames.Matches(t.name, side, finger, part)) _bones[i] = t;
+                    if (RigNames.Matches(t.name, side, finger, part, metacarpal)) _bones[i] = t;
                 if (_bones[i] == null) missing.Add(HandRig.Fingers[finger] + HandRig.Parts[part]);
             }
         }
