@@ -226,7 +226,7 @@ def fingers(bundle, shape: Shape, config: ActorConfig, clusters: dict[str, Array
     """Angles `(ticks, 2, 20)` of an actor whose tracker sees the wrists through `clusters`, T_wrist_cluster each."""
     actor = Actor(config, [Prop("box", "cube", shape)], bundle, Telemetry(), 0.1)
     actor.carry("box", "cube", shape, 1.4 * size)
-    synthesizer, shown = Synthesizer(bundle), []
+    synthesizer, shown = Synthesizer(bundle, solver="least_squares"), []
     for i in range(round(SECONDS * 120)):
         poses = around(1.4, i / 120, size)
         poses |= {name: compose(poses[name], T) for name, T in clusters.items()}
