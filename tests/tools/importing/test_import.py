@@ -266,6 +266,10 @@ def test_dexterhand_without_joints_says_how_to_make_them(tmp_path: Path, capsys:
     assert "the object is not rigid, and takes can only have rigid objects" in printed
 
 
+def test_an_odd_escape_in_a_pickle_is_text() -> None:
+    assert plain_values(b"S'\\i'\n.") == "\\i"
+
+
 def test_nothing_in_a_pickle_is_run(tmp_path: Path) -> None:
     class Evil:
         def __reduce__(self):

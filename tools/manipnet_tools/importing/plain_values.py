@@ -5,6 +5,7 @@ tuples and dictionaries. Where the pickle names code, a `Named` stands in the re
 """
 
 import pickletools
+import warnings
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -39,8 +40,10 @@ def plain_values(data: bytes) -> Any:
     stack: list[Any] = []
     memo: dict[int, Any] = {}
     try:
-        for opcode, argument, _ in pickletools.genops(data):
-            _run(opcode.name, argument, stack, memo)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # odd escapes in the texts of a damaged file
+            for opcode, argument, _ in pickletools.genops(data):
+                _run(opcode.name, argument, stack, memo)
         return stack[-1]
     except (IndexError, KeyError, TypeError, AttributeError, StopIteration, RecursionError) as error:
         raise ValueError(f"is damaged ({type(error).__name__}: {error})") from None
