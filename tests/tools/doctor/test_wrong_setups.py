@@ -483,7 +483,6 @@ AGREEING = (
     "a time that stands still, and no other",
     "a pose of NaN",
     "garbage over OSC",
-    "a t that is always zero",
 )
 
 
