@@ -18,6 +18,7 @@ from natnet_writer import Body, Frame, server_info
 from osc_streams import HZ, bodies, bridge, milliseconds, stream, transformation, vmc
 from osc_writer import bundle, osc
 
+from manipnet.runtime.diagnosis.finding import RECENT_S
 from manipnet.runtime.run_file import running_servers
 from manipnet_tools.doctor import command as doctor
 from manipnet_tools.doctor import examination
@@ -79,8 +80,10 @@ def over_osc(ports: Ports, *frames, seconds=60.0, hz=HZ) -> Iterator[list[str]]:
     ]
     for thread in threads:
         thread.start()
-    yield []
-    stopping.set()
+    try:
+        yield []
+    finally:
+        stopping.set()
 
 
 @contextmanager
@@ -101,9 +104,11 @@ def over_zmq(ports: Ports, send: Callable[[zmq.Socket, int], object], kind=zmq.P
 
     thread = threading.Thread(target=run)
     thread.start()
-    yield []
-    stopping.set()
-    thread.join()
+    try:
+        yield []
+    finally:
+        stopping.set()
+        thread.join()
 
 
 @contextmanager
@@ -125,9 +130,11 @@ def motive(ports: Ports, frame=None, version=(3, 0), **options) -> Iterator[list
 
         thread = threading.Thread(target=run)
         thread.start()
-        yield [f"--natnet=127.0.0.1:{fake.port}"]
-        stopping.set()
-        thread.join()
+        try:
+            yield [f"--natnet=127.0.0.1:{fake.port}"]
+        finally:
+            stopping.set()
+            thread.join()
 
 
 @contextmanager
@@ -483,6 +490,7 @@ AGREEING = (
     "a time that stands still, and no other",
     "a pose of NaN",
     "garbage over OSC",
+    "a t that is always zero",
 )
 
 
@@ -503,7 +511,8 @@ def test_the_running_server_and_the_listening_doctor_agree(name, ports, rig, tin
             serving(f"--rig={rig}", "--model", str(tiny_bundle), *ports.options, *options)
         )
         monkeypatch.setattr(examination, "ANSWER_S", 20.0)
-        for _ in range(40):
+        # what arrived while the server started comes in a burst, and is a problem as long as it is recent
+        for _ in range(round(3 * RECENT_S / 0.25)):
             doctor.main(ports.options)
             reported = troubles(capsys.readouterr().out.splitlines())
             if reported == listened:
