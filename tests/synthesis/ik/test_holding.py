@@ -47,10 +47,10 @@ def bar(tmp_path_factory):
     return build_shape(closed_mesh(mesh.vertices, mesh.faces, "bar"), tmp_path_factory.mktemp("cache"))
 
 
-def scene(shape, speed_m_s, side: Side = "right", bar_moves=True):
+def scene(shape, speed_m_s, side: Side = "right", bar_moves=True, height_m=1.0):
     """A hand with the palm down that moves along x at a constant speed, with the bar in it or at rest below it."""
     offsets = np.linspace(-0.5, 0.5, 21)
-    wrist = np.stack([np.concatenate([[speed_m_s * t, 1.0, 0.0], PALM_DOWN]) for t in offsets])
+    wrist = np.stack([np.concatenate([[speed_m_s * t, height_m, 0.0], PALM_DOWN]) for t in offsets])
     if side == "left":
         wrist = wrist * [-1, 1, 1, 1, -1, -1, 1]
     signs = np.array([-1, 1, 1, 1, -1, -1, 1]) if side == "left" else np.ones(7)
@@ -64,10 +64,10 @@ def improve(skeleton, chains, limits, solid, windows: Windows, count, predicted,
     improve_grips(Hands(skeleton, chains, limits, solid, windows, 0, count, predicted, angles, distances, grips))
 
 
-def run(scenes, ticks, predicted=OPEN, distances=None):
-    """The angles `(N, A)` after some ticks, if fingers do what their grips say."""
+def run(scenes, ticks, predicted=OPEN, distances=None, grips=None):
+    """The angles `(N, A)` after some ticks, if fingers do what their grips say; `grips (N, G)` go on if given."""
     count = len(scenes)
-    windows, grips = windows_of(scenes), np.zeros((count, GRIP))
+    windows, grips = windows_of(scenes), np.zeros((count, GRIP)) if grips is None else grips
     network, angles = np.tile(predicted, (count, 1)), np.tile(predicted, (count, 1))
     distances = np.full((count, 22), 0.012) if distances is None else distances
     for _ in range(ticks):
@@ -108,7 +108,25 @@ def test_both_hands_mirror_each_other(bar):
 def test_an_object_at_rest_is_not_gripped(bar):
     angles, grips = run([scene(bar, 0.0)], 60)
     np.testing.assert_array_equal(angles[0], OPEN)
-    assert not grips.any()
+    assert not unpack_grip.py_func(grips[0], 5).ages.any()
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_an_object_is_gripped_when_it_leaves_the_place_where_it_lay(bar, side):
+    _, grips = run([scene(bar, 0.0, side, height_m=1.0)], 3)
+    angles, _ = run([scene(bar, 0.3, side, height_m=1.01)], 60, grips=grips)
+    np.testing.assert_array_equal(angles[0], OPEN, err_msg="something else carries it, it is only pushed")
+    for height_m in (1.02, 0.98):
+        lifted = [scene(bar, 0.3, side, height_m=height_m)]
+        angles, _ = run(lifted, 90, grips=grips.copy())
+        assert unexplained_weight(lifted, angles) < physics.RULE.tolerance_m_s2
+
+
+def test_an_object_that_is_held_still_does_not_lie(bar):
+    moving, still = [scene(bar, 0.3)], [scene(bar, 0.0)]
+    _, grips = run(moving, 20)
+    angles, _ = run(still, 90, grips=grips, distances=np.full((1, 22), 0.010))
+    assert unexplained_weight(still, angles) < physics.RULE.tolerance_m_s2
 
 
 def test_an_object_that_stays_behind_is_not_gripped(bar):

@@ -13,9 +13,9 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, Chains
 from manipnet.synthesis.ik.chains import Surface
 from manipnet.synthesis.sensing.scene import map_point
 
-HELD_TICKS, NEXT_FINGER, FAILED_TICKS = 0, 1, 2
+HELD_TICKS, NEXT_FINGER, FAILED_TICKS, LAY_BEFORE, LAY_AT_M = 0, 1, 2, 3, 4
 """Entries of `Grip.hand`."""
-_HAND = 3
+_HAND = 5
 ANCHOR = 4
 """Numbers of an anchor."""
 ARRIVING_TICKS = 14
@@ -33,8 +33,8 @@ class Grip(NamedTuple):
     """The memory of one hand."""
 
     hand: Array
-    """`(3,)`: for how long it has held the object, which finger is looked at next, for how long the object has not
-    been carried; in ticks."""
+    """`(5,)`: for how many ticks it has held the object, which finger is looked at next, for how many ticks the object
+    has not been carried, whether it ever lay without a hand, and how high its lowest point was then, metres."""
     ages: Array
     """`(F,)` ticks since a finger was given a pose of its own; 0 for a finger that follows the network."""
     weights: Array

@@ -13,7 +13,7 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_CAPSULES,
 from manipnet.synthesis.hand.kinematics import pose_finger_into
 from manipnet.synthesis.ik.contacts import CONTACT, EDGES, TOUCH_M, add_wrenches, find_contact
 from manipnet.synthesis.ik.finger_poses import MOST_POSES, touching_poses
-from manipnet.synthesis.ik.grasp import ARM_M, finger_clearance, grasp_confidence
+from manipnet.synthesis.ik.grasp import finger_clearance, grasp_confidence
 from manipnet.synthesis.ik.grip import (
     ARRIVING_TICKS,
     FAILED_TICKS,
@@ -40,6 +40,7 @@ from manipnet.synthesis.ik.holders import (
 )
 from manipnet.synthesis.ik.nnls import SIZE
 from manipnet.synthesis.ik.overlap import finger_overlap
+from manipnet.synthesis.ik.support import lies, moved
 from manipnet.synthesis.model.layout import PRESENT
 
 TAKES, LEAVES = 0.5, 0.1
@@ -121,38 +122,25 @@ def _remember(hands: Hands, n: int):
 
 
 @inner
-def _moved(obj: Array, start: int, stop: int):
-    """How far an object moves between two samples of its window `(21, 7)`, metres, turning included."""
-    far = near = turned = 0.0
-    for i in range(7):
-        apart = (obj[stop, i] - obj[start, i]) ** 2
-        if i < 3:
-            far += apart
-        else:
-            near += apart
-            turned += (obj[stop, i] + obj[start, i]) ** 2
-    return np.sqrt(far) + 2.0 * ARM_M * np.sqrt(min(near, turned))
-
-
-@inner
 def _look_after(hands: Hands, first: int, work: Work):
     """Improve the grip on the object of hand `first` by one finger, if its holders do not carry it."""
     holders = find_holders(hands, first, work)
+    set_directions(hands.windows, first, work.directions)
+    lying = lies(hands, first)
     if holders == 0:
         return
     count = 0
     for h in range(holders):
         find_contacts(hands, h, work)
         count = add_hand(hands, h, -1, work, count)
-    set_directions(hands.windows, first, work.directions)
     worst, plain = left_at_worst(work, count)
     leader = hands.grips[int(work.numbers[0])]
-    if worst <= ENOUGH_M_S2:
+    if lying or worst <= ENOUGH_M_S2:
         leader[FAILED_TICKS] = 0.0
         return
     leader[FAILED_TICKS] += 1.0 if plain <= ENOUGH_M_S2 else PATIENCE_TICKS
     obj = hands.windows.object[first]
-    put_down = _moved(obj, PRESENT, PRESENT + _STEPS) < _STOPPED_M and _moved(obj, PRESENT - _STEPS, PRESENT) > _CAME_M
+    put_down = moved(obj, PRESENT, PRESENT + _STEPS) < _STOPPED_M and moved(obj, PRESENT - _STEPS, PRESENT) > _CAME_M
     if put_down or leader[FAILED_TICKS] < PATIENCE_TICKS:
         return
     # the fingers in turn, each first near its present pose; in the next round each over its whole range
