@@ -13,9 +13,9 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, Chains
 from manipnet.synthesis.ik.chains import Surface
 from manipnet.synthesis.sensing.scene import map_point
 
-HELD_TICKS, NEXT_FINGER, FAILED_TICKS, LAY_BEFORE, LAY_AT_M = 0, 1, 2, 3, 4
+HELD_TICKS, NEXT_FINGER, FAILED_TICKS, EASES, LAY_BEFORE, LAY_AT_M = 0, 1, 2, 3, 4, 5
 """Entries of `Grip.hand`."""
-_HAND = 5
+_HAND = 6
 ANCHOR = 4
 """Numbers of an anchor."""
 ARRIVING_TICKS = 14
@@ -94,6 +94,25 @@ def move_finger(chains: Chains, finger: int, predicted: Array, grip: Grip):
             pull = _PACE * (wanted - grip.offsets[angle]) - 2.0 * grip.speeds[angle]
             grip.speeds[angle] += _PACE * pull
             grip.offsets[angle] += grip.speeds[angle]
+
+
+@inner
+def ease_fingers(chains: Chains, share: float, predicted: Array, grip: Grip):
+    """Move the poses of fingers that have arrived a `share` of the way to the network's, `predicted (A,)`.
+
+    When the share becomes zero, a finger stays where it is at that moment.
+    """
+    stops = share == 0.0 and grip.hand[EASES] > 0.0
+    grip.hand[EASES] = share
+    for finger in range(len(chains.angles)):
+        if grip.ages[finger] <= ARRIVING_TICKS:
+            continue
+        for k in range(CHAIN_LENGTH):
+            angle = chains.angles[finger, k]
+            if angle >= 0 and stops:
+                grip.poses[angle] = predicted[angle] + grip.offsets[angle]
+            elif angle >= 0:
+                grip.poses[angle] += share * (predicted[angle] - grip.poses[angle])
 
 
 @inner

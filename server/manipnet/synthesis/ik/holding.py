@@ -19,6 +19,7 @@ from manipnet.synthesis.ik.grip import (
     FAILED_TICKS,
     HELD_TICKS,
     NEXT_FINGER,
+    ease_fingers,
     loosen_anchor,
     move_finger,
     take_pose,
@@ -49,6 +50,7 @@ LEAVES_M = 0.012
 """A finger that is predicted to be farther than this from the object lets go."""
 PATIENCE_TICKS = 5
 """A grip that carries the weight but not a push may be that short of it for this long."""
+EASE, SPARE = 0.05, 0.5
 BETTER_M_S2, POSTURE_M_S2 = 0.2, 4.0
 """What a new pose must improve; what a square radian of change costs."""
 OVERLAP_M, OVERLAP_S2 = 0.006, 60.0
@@ -137,11 +139,16 @@ def _look_after(hands: Hands, first: int, work: Work):
     leader = hands.grips[int(work.numbers[0])]
     if lying or worst <= ENOUGH_M_S2:
         leader[FAILED_TICKS] = 0.0
-        return
-    leader[FAILED_TICKS] += 1.0 if plain <= ENOUGH_M_S2 else PATIENCE_TICKS
+    else:
+        leader[FAILED_TICKS] += 1.0 if plain <= ENOUGH_M_S2 else PATIENCE_TICKS
+    failed = leader[FAILED_TICKS] >= PATIENCE_TICKS
+    eases = EASE if lying or worst <= SPARE * ENOUGH_M_S2 else 0.0
+    for h in range(holders):
+        n = int(work.numbers[h])
+        ease_fingers(hands.chains, eases, hands.predicted[n], unpack_grip(hands.grips[n], len(hands.chains.angles)))
     obj = hands.windows.object[first]
     put_down = moved(obj, PRESENT, PRESENT + _STEPS) < _STOPPED_M and moved(obj, PRESENT - _STEPS, PRESENT) > _CAME_M
-    if put_down or leader[FAILED_TICKS] < PATIENCE_TICKS:
+    if put_down or not failed:
         return
     # the fingers in turn, each first near its present pose; in the next round each over its whole range
     fingers = len(hands.chains.angles)
