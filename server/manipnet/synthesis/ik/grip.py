@@ -1,8 +1,9 @@
 """What a hand remembers of its grip, and how that changes from tick to tick.
 
 A finger of a hand that holds an object either follows the network or has a pose of its own, which was chosen because it
-carries (`holding`). It goes to that pose, and later back to the network's, like a critically damped spring. A fingertip
-that touches what the hand holds has an anchor on the object, so that it does not slide.
+carries (`holding`). It goes to that pose, and later back to the network's, like a critically damped spring. While the
+contacts carry more than they must, its pose eases toward the network's. A fingertip that touches what the hand holds
+has an anchor on the object, so that it does not slide.
 """
 
 from typing import NamedTuple
@@ -13,9 +14,9 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, Chains
 from manipnet.synthesis.ik.chains import Surface
 from manipnet.synthesis.sensing.scene import map_point
 
-HELD_TICKS, NEXT_FINGER, FAILED_TICKS, EASES, LAY_BEFORE, LAY_AT_M = 0, 1, 2, 3, 4, 5
+HELD_TICKS, NEXT_FINGER, FAILED_TICKS, FAILURES, EASES, LAY_BEFORE, LAY_AT_M = 0, 1, 2, 3, 4, 5, 6
 """Entries of `Grip.hand`."""
-_HAND = 6
+_HAND = 7
 ANCHOR = 4
 """Numbers of an anchor."""
 ARRIVING_TICKS = 14
@@ -33,8 +34,10 @@ class Grip(NamedTuple):
     """The memory of one hand."""
 
     hand: Array
-    """`(5,)`: for how many ticks it has held the object, which finger is looked at next, for how many ticks the object
-    has not been carried, whether it ever lay without a hand, and how high its lowest point was then, metres."""
+    """`(7,)`: for how many ticks it has held the object, which finger is looked at next, for how many ticks the object
+    has not been carried, how often that happened in this hold, what share of the way its fingers eased toward the
+    network's pose at the last tick, whether the object ever lay without a hand, and how high its lowest point was then,
+    metres."""
     ages: Array
     """`(F,)` ticks since a finger was given a pose of its own; 0 for a finger that follows the network."""
     weights: Array

@@ -293,7 +293,7 @@ def _box_along(box: Array, x: float, y: float, z: float):
 
 @inner
 def least_along(bvh: Bvh, direction: Array):
-    """The least of the corners' components along `direction (3,)`, metres: a walk down the tree, nearest boxes first."""
+    """The least component of a corner along `direction (3,)`, metres, by a walk down the tree, nearest boxes first."""
     x, y, z = direction[0], direction[1], direction[2]
     least, nodes, waiting = np.inf, _nodes(), 1
     nodes[0] = 0
