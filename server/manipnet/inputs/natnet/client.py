@@ -108,7 +108,7 @@ class NatNetBodies(Receiver):
         self._command = UdpThread(
             bind_udp(interface, 0),
             lambda: bind_udp(interface, 0),
-            self._receive,
+            self.receive,
             self._do_chores,
             self._lost,
             health,
@@ -201,7 +201,8 @@ class NatNetBodies(Receiver):
 
     # Packets
 
-    def _receive(self, packet: bytes, sender: Address, now_s: float) -> None:
+    def receive(self, packet: bytes, sender: Address, now_s: float) -> None:
+        """Take one packet that `sender` has sent. Belongs to the thread of the socket."""
         source = _source_of(sender)
         if not self._rate_limiter.admits(sender, now_s):
             self._intake.drop("rate", "natnet", "more packets than are read from senders that are not known yet")
@@ -265,7 +266,7 @@ class NatNetBodies(Receiver):
             except ListenError as error:
                 return str(error)
             health = ReceiverHealth("natnet-multicast", self._intake.telemetry)
-            self._data = UdpThread(data, join, self._receive, lambda now_s: CHORES_S, self._lost, health)
+            self._data = UdpThread(data, join, self.receive, lambda now_s: CHORES_S, self._lost, health)
             self._data.start()
         return None
 

@@ -38,20 +38,18 @@ class BodyMessages:
             text = "the message has several frames; send one, without a topic in front"
             self._intake.drop("malformed", source_of(part), text)
         else:
-            self._receive(part)
+            self.receive(part.bytes, source_of(part), time.monotonic())
 
-    def _receive(self, part: zmq.Frame) -> None:
-        now_s = time.monotonic()
-        source = source_of(part)
+    def receive(self, message: bytes, source: str, now_s: float) -> None:
+        """Take one message."""
         if not self._rate_limiter.admits(source, now_s):
             self._intake.drop("rate", source, "too many messages that cannot be used")
             return
         try:
-            frame = parse_bodies(part.bytes, now_s, source)
+            frame = parse_bodies(message, now_s, source)
         except MessageError as error:
             self._rate_limiter.bad(source)
-            reason = "oversized" if len(part.buffer) > MAX_MESSAGE_BYTES else "malformed"
-            self._intake.drop(reason, source, error)
+            self._intake.drop("oversized" if len(message) > MAX_MESSAGE_BYTES else "malformed", source, error)
             return
         self._rate_limiter.good(source)
         t_s = self._time(source, frame.t_s, now_s)
