@@ -18,6 +18,9 @@ MOST_WAITING = 32
 RATE_S = 1.0
 CLOCK_S = 10.0
 """The fastest frame of the last one to two of these periods counts, since clocks drift."""
+SETTLED_S = 0.25
+"""The rate of a sender and of its bodies is counted from this time on after its first frame: what was sent before the
+server listened may arrive in one burst."""
 RESTART_S = 1.0
 """Transit times vary by less than this. A larger change means that the sender's clock was set or restarted."""
 
@@ -74,7 +77,9 @@ class _Sender:
         self._frames = 0
         self._heard_s = self._since_s = self._clocked_s = first.t_received_s
         self._since_t_s = first.t_s
-        self._counted = -1  # the period begins with the first frame, so it is not one of those that follow
+        self._settles_s: float | None = first.t_received_s + SETTLED_S
+        """When its rate begins to be counted, until then."""
+        self._counted = 0
         self._rate_hz = 0.0
         self._speed: float | None = None
         self._offset_s = self._offset_before_s = first.t_s - first.t_received_s
@@ -84,9 +89,24 @@ class _Sender:
         """Take the next frames, at least one."""
         self._frames += len(frames)
         self._heard_s = frames[-1].t_received_s
-        self._note_rate(len(frames), frames[-1].t_s)
         self._note_offsets(frames)
+        if self._settles_s is not None:
+            settled = [frame for frame in frames if frame.t_received_s >= self._settles_s]
+            self._note_bodies(frames[: len(frames) - len(settled)])
+            if settled:
+                self._settle(settled[0])
+            frames = settled
+        if frames:
+            self._note_rate(len(frames), frames[-1].t_s)
         self._note_bodies(frames)
+
+    def _settle(self, first: BodyFrame) -> None:
+        """Begin to count the rate with this frame."""
+        self._settles_s = None
+        self._since_s, self._since_t_s = first.t_received_s, first.t_s
+        self._counted = -1  # the period begins with this frame, so it is not one of those that follow
+        for body in self._bodies.values():
+            body.restart()
 
     def report(self, now_s: float) -> dict[str, Any]:
         """One sender in `SenderStats.report`."""
@@ -97,7 +117,7 @@ class _Sender:
             "clock_offset_s": max(self._offset_s, self._offset_before_s),
             "clock_uncertainty_s": None,
             "clock_speed": self._speed,
-            "bodies": [body.report(*key, now_s) for key, body in self._bodies.items()],
+            "bodies": [body.report(*key, now_s, self._settles_s is None) for key, body in self._bodies.items()],
         }
 
     def _note_rate(self, count: int, t_s: float) -> None:
@@ -121,6 +141,8 @@ class _Sender:
 
     def _note_bodies(self, frames: Sequence[BodyFrame]) -> None:
         """Count the bodies of the frames. Most frames have the same bodies as the one before."""
+        if not frames:
+            return
         keys: list[_Key] = []
         group: list[BodyFrame] = []
         for frame in frames:
@@ -161,18 +183,25 @@ class _Body:
         """Take `frames` that arrived from `first_s` to `newest_s`. The body is tracked in `tracked` of them."""
         if first_s - self._since_s >= RATE_S and self._counted:
             self._rate_hz, self._share = self._counted / (first_s - self._since_s), self._tracked / self._counted
-            self._since_s, self._counted, self._tracked = first_s, 0, 0
+            self._counted = self._tracked = 0
+        if not self._counted:
+            self._since_s = first_s
         self.heard_s = newest_s
         self._counted += frames
         self._tracked += tracked
 
-    def report(self, id: int | None, name: str | None, now_s: float) -> dict[str, Any]:
+    def restart(self) -> None:
+        """Begin a period with the next frame. Of what was counted before, only the share that was tracked is kept."""
+        self._share = self._tracked / self._counted if self._counted else 0.0
+        self._counted = self._tracked = 0
+
+    def report(self, id: int | None, name: str | None, now_s: float, is_settled: bool) -> dict[str, Any]:
         """`id`, `name`, `rate_hz`, `age_s` and the share of the frames in which it was `tracked`."""
         is_young = not self._rate_hz
         return {
             "id": id,
             "name": name,
-            "rate_hz": self._rate_so_far() if is_young else self._rate_hz,
+            "rate_hz": self._rate_so_far() if is_young and is_settled else self._rate_hz,
             "age_s": max(now_s - self.heard_s, 0.0),
             "tracked": self._tracked / self._counted if self._counted and is_young else self._share,
         }
