@@ -18,13 +18,14 @@ from manipnet.synthesis.hand.kinematics import forward_kinematics, forward_kinem
 from manipnet.synthesis.hand.openxr import openxr_frames
 from manipnet.synthesis.hand.packed import unpack_skeleton
 from manipnet.synthesis.hand.profile import FINGERS
-from manipnet.synthesis.ik.carry import CONTACT_WEIGHT, MAX_SHIFT_M, PAD_WEIGHT, Samples, carry_contacts
+from manipnet.synthesis.ik.carry import CONTACT_WEIGHT, MAX_SHIFT_M, PAD_WEIGHT, TIP_WEIGHT, Samples, carry_contacts
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.rotations import matrix_to_quat_into, multiply_quats_into, quat_rotate_into
 from manipnet.wire.hand_names import BONE_NAMES, OPENXR_JOINT_NAMES
 
 ONSET_SHARE: Final = 0.25
 """Share of the way that contact comes in, and goes out, at each tick when an object appears or is lost."""
+PACE_POWER: Final = 2.0
 _ALONG: Final = (1.0 / 3.0, 2.0 / 3.0, 1.0)
 _ALONG_TIP: Final = (0.25, 0.5, 0.75, 1.0)
 _ALONG_PALM: Final = (0.3, 0.65, 1.0)
@@ -60,6 +61,7 @@ class HandCarrier:
         self._samples, self._max_shift_m = samples_of(avatar, model), max_shift_m
         self._difference, self._shift = np.zeros(avatar.hand.angle_count), np.zeros(3)
         self._touching, self._held = 0.0, None
+        self._pace, self._followed = 1.0 / max(avatar.length_ratio, 1.0) ** PACE_POWER, None
 
     @property
     def shift(self) -> Array:
@@ -78,6 +80,8 @@ class HandCarrier:
         scene = wrist
         if mirrored:
             scene = mirror_poses(wrist)
+        if self._followed is None:
+            self._followed = avatar.follow @ model_angles
         if self._held is None:
             np.clip(avatar.follow @ model_angles, *avatar.hand.limits.T, angles)
         else:
@@ -97,6 +101,8 @@ class HandCarrier:
                 self._touching,
                 self._max_shift_m,
                 model_angles,
+                self._pace,
+                self._followed,
                 self._difference,
                 angles,
                 self._shift,
@@ -172,7 +178,8 @@ def samples_of(avatar: AvatarHand, model: Hand) -> Samples:
             if start in chain:
                 along = _ALONG_TIP if end == chain[-1] else _ALONG
                 for fraction in along:
-                    add(start, end, fraction, radius, CONTACT_WEIGHT / len(along))
+                    is_tip = end == chain[-1] and fraction == 1.0
+                    add(start, end, fraction, radius, TIP_WEIGHT if is_tip else CONTACT_WEIGHT / len(along))
         tip, bone = int(avatar.tip_joints[f]), chain[-2]
         a, b, _ = _counterpart(openxr[bone], tip, 1.0, zero)
         turns = np.stack([avatar.places.turns[tip], frames.offsets[0, tip]])

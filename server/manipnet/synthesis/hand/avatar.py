@@ -69,6 +69,8 @@ class AvatarHand:
     """Whether any of the radii is guessed."""
     tip_joints: Indices
     """`(F,)` the OpenXR tip of each finger."""
+    length_ratio: float
+    """Length of its fingers, from root to tip, relative to the model's."""
 
 
 class _Finger(NamedTuple):
@@ -181,7 +183,16 @@ class _Builder:
         limits[:, 1] = np.maximum(limits[:, 1], rest_angles)
         places = self._places(hand, rest_angles)
         tip_joints = np.array([f.joints[-1] for f in self._fingers])
-        return AvatarHand(hand, places, np.array(self.follow), radii, guessed, tip_joints)
+        return AvatarHand(hand, places, np.array(self.follow), radii, guessed, tip_joints, self._length_ratio())
+
+    def _length_ratio(self) -> float:
+        ours = theirs = 0.0
+        for finger in self._fingers:
+            row = [self._joints[k, :3] for k in finger.joints]
+            ours += sum(float(np.linalg.norm(b - a)) for a, b in pairwise(row))
+            path = [self._positions[OUR_JOINTS[k]] for k in finger.joints]
+            theirs += sum(float(np.linalg.norm(b - a)) for a, b in pairwise(path))
+        return ours / theirs
 
     def _add_finger(self, finger: _Finger) -> None:
         start, after = finger.joints[:2]

@@ -31,14 +31,15 @@ TOUCHING_M, FREE_M = 0.003, 0.012
 TOUCHING_SHARE = 0.5
 """Samples that touch are to have this share of the gap, or depth, of their counterparts, so that none is lost."""
 CONTACT_WEIGHT = 4.0
-PAD_WEIGHT = 6.0
+TIP_WEIGHT = 4.0
+PAD_WEIGHT = 8.0
 DEPTH_WEIGHT = 6.0
 """Push on a sample that is deeper than its counterpart."""
 SLIDE_WEIGHT = 0.15
 """Pull of a touching pad toward the place where the model's pad is."""
 STAY_WEIGHT_M2 = 5e-4
 """Pull toward the model's angles, in square metres per square radian."""
-CALM_WEIGHT_M2 = 1e-2
+CALM_WEIGHT_M2 = 1.2e-2
 """Pull toward the last tick's difference from the model's angles."""
 WRIST_WEIGHT = 1.0
 """Pull of the wrist toward where it is tracked."""
@@ -183,6 +184,8 @@ def carry_contacts(
     touching: float,
     max_shift_m: float,
     model_angles: Array,
+    pace: float,
+    followed: Array,
     before: Array,
     angles: Array,
     shift: Array,
@@ -190,8 +193,9 @@ def carry_contacts(
     """The angles `(A,)` of the avatar's hand beside an object, and the `shift (3,)` of its wrist in the wrist frame.
 
     `wrist` and `obj` are poses `(7,)` of the scene, both mirrored for a left hand; `size` is the size of the actor's
-    hand relative to the model's. `touching` is how much contact counts, 0 to 1. `before (A,)` and `shift` are the
-    difference from the followed angles and the shift of the last tick, and are replaced.
+    hand relative to the model's. `touching` is how much contact counts, 0 to 1. `followed (A,)`, `before (A,)` and
+    `shift` are replaced: the model's angles as the avatar follows them, at its `pace`, the difference that contact
+    makes, and the shift, all of the last tick.
     """
     skeleton, chains = unpack_skeleton(avatar), unpack_chains(avatar)
     theirs = unpack_skeleton(model)
@@ -217,9 +221,11 @@ def carry_contacts(
         gaps[s] += move
 
     for a in range(len(angles)):
-        reference[a] = 0.0
+        target = 0.0
         for k in range(len(model_angles)):
-            reference[a] += follow[a, k] * model_angles[k]
+            target += follow[a, k] * model_angles[k]
+        followed[a] += pace * (target - followed[a])
+        reference[a] = followed[a]
         angles[a] = clamp(reference[a] + before[a], limits, a)
 
     normal, slope, mixed = _normal(), _slope(), _mixed()
