@@ -25,7 +25,7 @@ from manipnet.wire.hand_names import BONE_NAMES, OPENXR_JOINT_NAMES
 
 ONSET_SHARE: Final = 0.25
 """Share of the way that contact comes in, and goes out, at each tick when an object appears or is lost."""
-PACE_POWER: Final = 2.0
+PACE_POWER: Final = 2.5
 _ALONG: Final = (1.0 / 3.0, 2.0 / 3.0, 1.0)
 _ALONG_TIP: Final = (0.25, 0.5, 0.75, 1.0)
 _ALONG_PALM: Final = (0.3, 0.65, 1.0)

@@ -31,15 +31,15 @@ TOUCHING_M, FREE_M = 0.003, 0.012
 TOUCHING_SHARE = 0.5
 """Samples that touch are to have this share of the gap, or depth, of their counterparts, so that none is lost."""
 CONTACT_WEIGHT = 4.0
-TIP_WEIGHT = 4.0
-PAD_WEIGHT = 8.0
+TIP_WEIGHT = 6.0
+PAD_WEIGHT = 9.0
 DEPTH_WEIGHT = 6.0
 """Push on a sample that is deeper than its counterpart."""
 SLIDE_WEIGHT = 0.15
 """Pull of a touching pad toward the place where the model's pad is."""
 STAY_WEIGHT_M2 = 5e-4
 """Pull toward the model's angles, in square metres per square radian."""
-CALM_WEIGHT_M2 = 1.2e-2
+CALM_WEIGHT_M2 = 1.5e-2
 """Pull toward the last tick's difference from the model's angles."""
 WRIST_WEIGHT = 1.0
 """Pull of the wrist toward where it is tracked."""
