@@ -60,8 +60,11 @@ class HandCarrier:
         self.avatar, self._model, self._side = avatar, model, side
         self._samples, self._max_shift_m = samples_of(avatar, model), max_shift_m
         self._difference, self._shift = np.zeros(avatar.hand.angle_count), np.zeros(3)
-        self._touching, self._held = 0.0, None
-        self._pace, self._followed = 1.0 / max(avatar.length_ratio, 1.0) ** PACE_POWER, None
+        self._touching = 0.0
+        self._held: Held | None = None
+        self._angles: Array | None = None
+        self._pace = 1.0 / max(avatar.length_ratio, 1.0) ** PACE_POWER
+        self._followed: Array | None = None
 
     @property
     def shift(self) -> Array:
@@ -107,6 +110,16 @@ class HandCarrier:
                 angles,
                 self._shift,
             )
+        self._angles = angles
+        return self._placed(wrist)
+
+    def hold(self, model_angles: Array, wrist: Array) -> AvatarPose:
+        """The hand with the fingers of the last tick, at `wrist (7,)`; before the first tick, as `step` makes it."""
+        return self.step(model_angles, wrist, None) if self._angles is None else self._placed(wrist)
+
+    def _placed(self, wrist: Array) -> AvatarPose:
+        avatar, mirrored, angles = self.avatar, self._side == "left", self._angles
+        assert angles is not None
         shift = self._shift * [-1.0, 1.0, 1.0] if mirrored else self._shift
         moved = np.concatenate([wrist[:3] + quat_rotate(wrist[3:], shift), wrist[3:]])
         rotations, joints = np.empty((len(BONE_NAMES), 4)), np.empty((len(OPENXR_JOINT_NAMES), 7))
