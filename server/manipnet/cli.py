@@ -34,8 +34,8 @@ EPILOG = """examples:
   manipnet-serve --mesh Box=mug.obj                       track the bodies left_wrist, right_wrist and Box
   manipnet-serve --rig stage.toml --look-ahead 0.1        read from a file which bodies are tracked
   manipnet-serve --set bodies.left_wrist=3 --mesh 7=mug   name bodies by streaming id; use a mug of the library
-All options but --rig, --mesh, --hand, --set, --print-config and --log-format may also be in the [server] table of the rig file;
-the command line overrides the file."""
+All options but --rig, --mesh, --hand, --set, --print-config and --log-format may also be in the [server] table of the
+rig file; the command line overrides the file."""
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -41,7 +41,10 @@ class Session:
     """Loads what is configured, and makes the parts of a server that need it."""
 
     def __init__(self, config: ServerConfig, wait_for_kernels: Callable[[], object]) -> None:
-        """Raises `BundleError`, `MeshError` and `ProfileError`. `wait_for_kernels` is called before the first kernel of sensing."""
+        """Raises `BundleError`, `MeshError` and `ProfileError`.
+
+        `wait_for_kernels` is called before the first kernel of sensing.
+        """
         self.config = config
         self.id = secrets.token_hex(8)
         self.telemetry = Telemetry()

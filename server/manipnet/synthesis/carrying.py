@@ -174,7 +174,9 @@ def samples_of(avatar: AvatarHand, model: Hand) -> Samples:
     frames = openxr_frames(model)
     joints, fractions, offsets, radii, weights, first, pads = [], [], [], [], [], [], []
     openxr = [OPENXR_JOINT_NAMES.index(name) if name != "WRIST" else 1 for name in hand.joint_names]
-    model_radius = {tuple(capsule): radius for capsule, radius in zip(model.capsules.tolist(), model.radii, strict=True)}
+    model_radius = {
+        tuple(capsule): radius for capsule, radius in zip(model.capsules.tolist(), model.radii, strict=True)
+    }
 
     def add(start: int, end: int, fraction: float, radius: float, weight: float) -> None:
         a, b, at = _counterpart(openxr[start], openxr[end], fraction, zero)

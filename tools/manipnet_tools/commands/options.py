@@ -119,7 +119,7 @@ class SynthesizeOptions:
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
     hand: Annotated[Path | None, _optional("HAND.json")] = None
-    """Also write the hands of an avatar: its profile, as `manipnet hand import` makes it; by default that of the rig."""
+    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
 
@@ -156,7 +156,7 @@ class BatchOptions:
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
     hand: Annotated[Path | None, _optional("HAND.json")] = None
-    """Also write the hands of an avatar: its profile, as `manipnet hand import` makes it; by default that of the rig."""
+    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
     jobs: Annotated[int | None, _optional("N")] = None

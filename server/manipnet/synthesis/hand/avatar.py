@@ -1,7 +1,7 @@
 """An avatar's hand as the kernels know hands: a `Hand` made from a `ProfileHand`, beside the model's.
 
-Every finger is a chain of at most four hinges: two at its root (the thumb's carpal joint, a finger's knuckle) and one at
-each further joint. At the root they are the model's, which anatomy gives; the others are perpendicular to the bones and
+Every finger is a chain of at most four hinges: two at its root (the thumb's carpal joint, a finger's knuckle) and one
+at each further joint. At the root they are the model's, which anatomy gives; the others are perpendicular to the bones and
 come from the geometry of the profile. Angles mean what the model's mean: at zero, every finger is straight and points
 where the model's does, so the model's angles are the first guess and its limits are the avatar's.
 """
@@ -15,6 +15,8 @@ import numpy as np
 from manipnet.geometry import (
     Array,
     Side,
+    compose,
+    invert,
     matrix_to_quat,
     mirror_poses,
     quat_exp,
@@ -91,17 +93,14 @@ def model_profile(model: Hand, side: Side) -> ProfileHand:
     """The model's own hand as a profile."""
     straight = np.zeros((1, model.angle_count))
     _, world = pose_in_world(model, [side], straight, np.array([[0.0, 0, 0, 0, 0, 0, 1]]), 1.0)
-    turn = quat_multiply(world[0, 1, 3:], np.array([-1.0, -1, -1, 1]) * 1.0) if False else world[0, 1]
-    back = turn * [-1, -1, -1, -1, -1, -1, 1]
-    joints = np.hstack([quat_rotate(back[3:], world[0, :, :3]), quat_multiply(back[3:], world[0, :, 3:])])
-    return ProfileHand(joints, model_radii(model))
+    return ProfileHand(compose(invert(world[0, 1]), world[0]), model_radii(model))
 
 
 def model_radii(model: Hand) -> Array:
     """The radii of the model's capsules at the OpenXR joints where they start, `(26,)`; a tip has its bone's."""
     of_start = {(int(s), int(e)): r for (s, e), r in zip(model.capsules, model.radii, strict=True)}
     radii = np.full(len(OPENXR_JOINT_NAMES), np.nan)
-    for f, row in enumerate(FINGERS):
+    for row in FINGERS:
         for k, after in pairwise(row):
             start, end = OUR_JOINTS[k], OUR_JOINTS[after]
             radii[k] = of_start[(start, end)]
@@ -340,7 +339,7 @@ def _aim(first: Array, second: Array, start: Array, end: Array) -> Array:
         inner = _turn(second, angles[1]) @ start
         here = outer @ inner
         jacobian = np.stack([np.cross(first, here), outer @ np.cross(second, inner)], axis=1)
-        step = np.linalg.solve(jacobian.T @ jacobian + 1e-3 * np.eye(2), jacobian.T @ (end - here) - 0.0 * angles)
+        step = np.linalg.solve(jacobian.T @ jacobian + 1e-3 * np.eye(2), jacobian.T @ (end - here))
         angles += np.clip(step, -0.3, 0.3)
     return angles
 
@@ -351,6 +350,4 @@ def _no_skin(angles: int) -> Skin:
 
 
 def _no_sensors() -> Sensors:
-    return Sensors(
-        np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros((0, 2, 3)), np.zeros((0, 2, 3)), np.zeros(3)
-    )
+    return Sensors(np.zeros((0, 2), np.int64), np.zeros((0, 2)), np.zeros((0, 2, 3)), np.zeros((0, 2, 3)), np.zeros(3))

@@ -19,7 +19,7 @@ from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 MAX_NAME_BYTES: Final = 63
 LENGTHS_M: Final = (0.05, 0.6)
-"""Shortest and longest hand that is accepted, from the wrist to the farthest fingertip; a human hand has 0.15 to 0.22."""
+"""Shortest and longest hand that is accepted, from the wrist to the farthest fingertip; a human one has 0.15 to 0.22."""
 RADII_M: Final = (0.0005, 0.08)
 SAME_PLACE_M: Final = 1e-4
 """A joint this near its parent has no bone before it, so it counts as missing."""
