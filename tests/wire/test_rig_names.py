@@ -52,7 +52,7 @@ FAMILIES = {
     "MakeHuman": family("wrist.L", "finger{g}-{n}.L"),
     "VRChat": family("Left wrist", "{word}Finger{n}_L", LITTLE, thumb={(0, p): f"Thumb{p}_L" for p in range(3)}),
     "Motive": family("Skeleton 001_LHand", "Skeleton 001_L{word}{n}"),
-    "MMD": family("左手首", "左{word}{n}", MMD, thumb={(0, p): f"左親指{'０１２'[p]}" for p in range(3)}),
+    "MMD": family("左手首", "左{word}{n}", MMD, thumb={(0, p): f"左親指{chr(0xFF10 + p)}" for p in range(3)}),
     "MMD in Blender": family("手首.L", "{word}{n}.L", MMD, thumb={(0, p): f"親指{p}.L" for p in range(3)}),
     "MMD in English": family(
         "wrist_L",

@@ -11,16 +11,14 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array, Side, mirror_poses, quat_rotate
-from manipnet.jit import kernel, stack_array, vector
-from manipnet.synthesis.hand.avatar import OUR_JOINTS, AvatarHand, OpenXrPlaces
-from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Hand
-from manipnet.synthesis.hand.kinematics import forward_kinematics, forward_kinematics_into
+from manipnet.synthesis.hand.avatar import OUR_JOINTS, AvatarHand
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.openxr import openxr_frames
-from manipnet.synthesis.hand.packed import unpack_skeleton
+from manipnet.synthesis.hand.places import place_joints
 from manipnet.synthesis.hand.profile import FINGERS
 from manipnet.synthesis.ik.carry import CONTACT_WEIGHT, MAX_SHIFT_M, PAD_WEIGHT, TIP_WEIGHT, Samples, carry_contacts
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.rotations import matrix_to_quat_into, multiply_quats_into, quat_rotate_into
 from manipnet.wire.hand_names import BONE_NAMES, OPENXR_JOINT_NAMES
 
 ONSET_SHARE: Final = 0.25
@@ -30,9 +28,6 @@ _ALONG: Final = (1.0 / 3.0, 2.0 / 3.0, 1.0)
 _ALONG_TIP: Final = (0.25, 0.5, 0.75, 1.0)
 _ALONG_PALM: Final = (0.3, 0.65, 1.0)
 """Fractions of a capsule at which it is sampled; the forearm begins before 0.3 of the palm's."""
-
-_positions, _rotations, _axes = stack_array(MAX_JOINTS, 3), stack_array(MAX_JOINTS, 3, 3), stack_array(MAX_ANGLES, 3)
-_quats, _quat = stack_array(MAX_JOINTS, 4), stack_array(4)
 
 Held = tuple[Shape, Array, float]
 """An object near a hand: its shape, the pose `(7,)` of its mesh frame in the world, and its scale."""
@@ -123,47 +118,8 @@ class HandCarrier:
         shift = self._shift * [-1.0, 1.0, 1.0] if mirrored else self._shift
         moved = np.concatenate([wrist[:3] + quat_rotate(wrist[3:], shift), wrist[3:]])
         rotations, joints = np.empty((len(BONE_NAMES), 4)), np.empty((len(OPENXR_JOINT_NAMES), 7))
-        _place_joints(avatar.hand.packed, avatar.places, angles, moved, mirrored, rotations, joints)
+        place_joints(avatar.hand.packed, avatar.places, angles, moved, mirrored, rotations, joints)
         return AvatarPose(angles, rotations, moved, joints)
-
-
-@kernel
-def _place_joints(
-    hand: np.ndarray,
-    places: OpenXrPlaces,
-    angles: Array,
-    wrist: Array,
-    left: bool,
-    turns: Array,
-    joints: Array,
-):
-    skeleton, positions, rotations, axes = unpack_skeleton(hand), _positions(), _rotations(), _axes()
-    quats, quat, turned, point = _quats(), _quat(), _quat(), vector()
-    forward_kinematics_into(skeleton, angles, positions, rotations, axes)
-    for bone in range(len(skeleton.rest)):
-        matrix_to_quat_into(rotations[bone], False, quats[bone])
-    for k in range(len(turns)):
-        bone = places.angle_of[k]
-        if bone < 0:
-            turns[k, 0], turns[k, 1], turns[k, 2], turns[k, 3] = 0.0, 0.0, 0.0, 1.0
-            continue
-        multiply_quats_into(quats[max(skeleton.parents[bone], 0)], -1.0, quats[bone], quat)
-        multiply_quats_into(places.rest[bone], -1.0, quat, turns[k])
-        if left:
-            turns[k, 1], turns[k, 2] = -turns[k, 1], -turns[k, 2]
-    for k in range(len(joints)):
-        bone = places.bones[k]
-        for i in range(3):
-            point[i] = positions[bone, i]
-            for j in range(3):
-                point[i] += rotations[bone, i, j] * places.points[k, j]
-        multiply_quats_into(quats[bone], 1.0, places.turns[k], turned)
-        if left:
-            point[0], turned[1], turned[2] = -point[0], -turned[1], -turned[2]
-        quat_rotate_into(wrist[3:], point, joints[k, :3])
-        for i in range(3):
-            joints[k, i] += wrist[i]
-        multiply_quats_into(wrist[3:], 1.0, turned, joints[k, 3:])
 
 
 @lru_cache(64)

@@ -8,7 +8,6 @@ import unicodedata
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
-from os.path import commonprefix
 from typing import Final
 
 from manipnet.geometry import SIDES, Side
@@ -149,8 +148,13 @@ def _thumb(
 def _prefix(names: Collection[str]) -> str:
     """What most names of a rig begin with, up to a punctuation mark, such as the name of the skeleton in Motive."""
     sides = [name for name in names if "hand" in plain(name)] or list(names)
-    common = commonprefix(sides)
-    return common[: max(common.rfind("_"), common.rfind(":"), common.rfind("-"), common.rfind(".")) + 1]
+    common = _common_start(min(sides, default=""), max(sides, default=""))
+    return common[: max(common.rfind(mark) for mark in "_:-.") + 1]
+
+
+def _common_start(first: str, last: str) -> str:
+    """What two texts begin with; of the smallest and the largest of many, it is what all of them begin with."""
+    return first[: next((n for n, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), len(first))]
 
 
 def _filled(patterns: tuple[str, ...], side: Side, finger: int, part: int) -> Iterator[str]:

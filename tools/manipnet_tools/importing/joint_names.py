@@ -37,7 +37,8 @@ def recognised(names: Iterable[str]) -> dict[str, Joint]:
             joints[name] = (side, 0)
         elif (place := _place(finger, part, with_base=(side, "base") in thumbs)) is not None:
             joints[name] = (side, 1 + 4 * finger + place)
-    return _of_rigs(parsed) | joints
+    joints = _of_rigs(parsed) | joints
+    return {name: joints[name] for name in parsed if name in joints}
 
 
 def _of_rigs(names: Iterable[str]) -> dict[str, Joint]:

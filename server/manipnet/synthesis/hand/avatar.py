@@ -1,9 +1,9 @@
 """An avatar's hand as the kernels know hands: a `Hand` made from a `ProfileHand`, beside the model's.
 
 Every finger is a chain of at most four hinges: two at its root (the thumb's carpal joint, a finger's knuckle) and one
-at each further joint. At the root they are the model's, which anatomy gives; the others are perpendicular to the bones and
-come from the geometry of the profile. Angles mean what the model's mean: at zero, every finger is straight and points
-where the model's does, so the model's angles are the first guess and its limits are the avatar's.
+at each further joint. At the root they are the model's, which anatomy gives; the others are perpendicular to the bones
+and come from the geometry of the profile. Angles mean what the model's mean: at zero, every finger is straight and
+points where the model's does, so the model's angles are the first guess and its limits are the avatar's.
 """
 
 from dataclasses import dataclass
@@ -27,6 +27,7 @@ from manipnet.geometry import (
 from manipnet.synthesis.hand.hand import Hand, Indices, Sensors, Skin
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.openxr import pose_in_world
+from manipnet.synthesis.hand.places import OpenXrPlaces
 from manipnet.synthesis.hand.profile import FINGERS, ProfileHand, present_joints
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES
 
@@ -40,21 +41,6 @@ _Q_WRIST_OPENXR: Final = np.array([0.5, -0.5, -0.5, 0.5])
 """The OpenXR frame of a right wrist in the frame of `hand`."""
 _ROOT_ANGLES: Final = ((0, 1), (4, 5), (8, 9), (12, 13), (16, 17))
 """The model's two angles at the root of each finger."""
-
-
-class OpenXrPlaces(NamedTuple):
-    """Where the 26 OpenXR joints are on the bones of a hand."""
-
-    bones: Indices
-    """`(26,)` the bone that each turns with."""
-    points: Array
-    """`(26, 3)` its position in that bone's frame."""
-    turns: Array
-    """`(26, 4)` its rotation in that bone's frame."""
-    angle_of: Indices
-    """`(17,)` the avatar's bone for each of the 17 bones of a message; -1 where it has none."""
-    rest: Array
-    """`(B, 4)` local rotation of each bone in the profile's rest pose."""
 
 
 @dataclass(frozen=True, eq=False)

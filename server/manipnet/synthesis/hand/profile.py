@@ -19,10 +19,11 @@ from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 MAX_NAME_BYTES: Final = 63
 LENGTHS_M: Final = (0.05, 0.6)
-"""Shortest and longest hand that is accepted, from the wrist to the farthest fingertip; a human one has 0.15 to 0.22."""
+"""Shortest and longest hand that is accepted, from the wrist to the farthest fingertip; humans have 0.15 to 0.22."""
 RADII_M: Final = (0.0005, 0.08)
 SAME_PLACE_M: Final = 1e-4
 """A joint this near its parent has no bone before it, so it counts as missing."""
+_HUGE: Final = 1e12
 _COUNT: Final = len(OPENXR_JOINT_NAMES)
 _WRIST: Final = OPENXR_JOINT_NAMES.index("wrist")
 _OTHER: Final[dict[Side, Side]] = {"left": "right", "right": "left"}
@@ -138,7 +139,7 @@ def _joints(side: Side, rows: Any) -> Array:
             continue
         if not isinstance(row, (list, tuple)) or len(row) != 7 or not all(map(_is_number, row)):
             raise ProfileError(f"{where} must be 7 numbers, x y z and a quaternion x y z w, or null if it is missing")
-        joints[k] = row
+        joints[k] = [x if abs(x) < _HUGE else np.inf for x in row]
         if not np.isfinite(joints[k]).all():
             raise ProfileError(f"{where} holds a number that is not finite")
         length = float(np.linalg.norm(joints[k, 3:]))
