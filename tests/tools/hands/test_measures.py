@@ -31,7 +31,7 @@ class Grasp:
 @pytest.fixture(scope="module")
 def grasps():
     take = read_take(DEMO_FILE)
-    shapes, ticks = read_shapes((), take, DEMO_FILE), tick_take(take)
+    shapes, ticks = read_shapes(("cube=cube", "cylinder=cylinder", "mug=mug"), take, DEMO_FILE), tick_take(take)
     inputs = hand_inputs(ticks, shapes)
     motions = roll_out(Synthesizer(load_bundle()), list(inputs.values()))
     return {

@@ -21,6 +21,8 @@ UNITS: Final = {"metres": 1.0, "centimetres": 0.01, "decimetres": 0.1, "millimet
 HUMAN_M: Final = (0.13, 0.24)
 TIP_SHARE: Final = 0.8
 """The last bone of a finger relative to the one before it, where neither the rig nor the skin shows its end."""
+THUMB_BEHIND: Final = 0.08
+"""How far the thumb's last joint may be behind the knuckles, relative to the length of the palm."""
 RADIUS_SHARES: Final = (0.5, 1.7)
 """How far a radius from the skin may be from the guess by lengths."""
 
@@ -146,11 +148,12 @@ class _RigHand:
         if not thumb:
             return turn
         tip = self._points[thumb[-1]] @ turn
-        knuckles = np.array([self._points[self._bones[k]] @ turn for k in roots])
-        if tip[0] > knuckles[:, 0].mean():
+        knuckles = np.array([self._points[self._bones[k]] @ turn for k in roots]).mean(axis=0)
+        is_outside, is_behind = tip[0] > knuckles[0], tip[1] > knuckles[1] + THUMB_BEHIND * np.linalg.norm(knuckles)
+        if is_outside or is_behind:
             raise RigFileError(
-                f"{self._where}: the thumb of the {self._side} hand lies on the little finger's side: it is the other "
-                "hand, or a mirrored one; swap the names of the sides, or apply the negative scale in your program"
+                f"{self._where}: the thumb of the {self._side} hand lies on the wrong side: it is the other hand, or "
+                "a mirrored one; swap the names of the sides, or apply the negative scale in your program"
             )
         return turn
 
