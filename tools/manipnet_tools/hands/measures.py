@@ -26,7 +26,7 @@ DROP_FRAMES = 60
 
 
 @dataclass(frozen=True)
-class HandMotion:
+class AvatarMotion:
     """One hand at T ticks: OpenXR joints `(T, 26, 7)` in the world, and the hand that they are of."""
 
     avatar: AvatarHand
@@ -66,17 +66,17 @@ class HandMeasures:
 
 def carry_take(
     model: Hand, profile: HandProfile, side: Side, angles: Array, wrist: Array, held: list[Held], size: float = 1.0
-) -> tuple[HandMotion, HandMotion]:
+) -> tuple[AvatarMotion, AvatarMotion]:
     """The model's hand with `angles (T, A)` at `wrist (T, 7)`, and what is carried onto the avatar's."""
     own = avatar_hand(model_profile(model, side), side, model)
     _, joints = pose_in_world(model, [side] * len(wrist), angles, wrist, size)
     avatar = avatar_hand(profile.hands[side], side, model)
     carrier = HandCarrier(avatar, model, side)
     carried = [carrier.step(*each, size).joints for each in zip(angles, wrist, held, strict=True)]
-    return HandMotion(own, joints), HandMotion(avatar, np.stack(carried))
+    return AvatarMotion(own, joints), AvatarMotion(avatar, np.stack(carried))
 
 
-def measure_hand(own: HandMotion, avatar: HandMotion, shape: Shape, T_world_object: Array) -> HandMeasures:
+def measure_hand(own: AvatarMotion, avatar: AvatarMotion, shape: Shape, T_world_object: Array) -> HandMeasures:
     """Compare an avatar's hand with the model's, both about one object with poses `(T, 7)`."""
     counts = metrics.settled(len(T_world_object))
     kept, touching = _kept(
@@ -94,7 +94,7 @@ def measure_hand(own: HandMotion, avatar: HandMotion, shape: Shape, T_world_obje
 
 
 def drop_shares(
-    own: Mapping[Side, HandMotion], avatar: Mapping[Side, HandMotion], shape: Shape, T_world_object: Array
+    own: Mapping[Side, AvatarMotion], avatar: Mapping[Side, AvatarMotion], shape: Shape, T_world_object: Array
 ) -> tuple[float, float, int]:
     """The shares of lifted frames in which the model's hands, and the avatar's, hold the object, and their number.
 
@@ -123,7 +123,7 @@ def drop_shares(
     return float(held[0].mean()), float(held[1].mean()), len(frames)
 
 
-def _kept(before: Array, after: Array, own: HandMotion, avatar: HandMotion, counts: Mask) -> tuple[float, int]:
+def _kept(before: Array, after: Array, own: AvatarMotion, avatar: AvatarMotion, counts: Mask) -> tuple[float, int]:
     """The share of the fingers that touch before and touch after, and the number of those before."""
     fingers = [own.avatar.tip_joints.tolist().index(tip) for tip in avatar.avatar.tip_joints.tolist()]
     touched = (np.abs(before[:, fingers]) < PAD_M) & counts[:, None]
@@ -132,16 +132,16 @@ def _kept(before: Array, after: Array, own: HandMotion, avatar: HandMotion, coun
     return float((np.abs(after) < PAD_M)[touched].mean()), int(touched.sum())
 
 
-def _pad_gaps(motion: HandMotion, shape: Shape, T_world_object: Array) -> Array:
+def _pad_gaps(motion: AvatarMotion, shape: Shape, T_world_object: Array) -> Array:
     """Signed distances of the pads to the object, `(T, F)`."""
     p_object = transform(invert(T_world_object)[:, None], motion.pads)
     return shape.signed_distance(p_object.reshape(-1, 3))[0].reshape(p_object.shape[:2])
 
 
-def _last_capsules(motion: HandMotion) -> list[int]:
+def _last_capsules(motion: AvatarMotion) -> list[int]:
     ends = motion.avatar.hand.capsules[:, 1].tolist()
     return [ends.index(finger[-1]) for finger in motion.avatar.hand.fingers]
 
 
-def _in_wrist(motion: HandMotion) -> Array:
+def _in_wrist(motion: AvatarMotion) -> Array:
     return transform(invert(motion.joints[:, 1])[:, None], motion.joints[..., :3])
