@@ -28,7 +28,7 @@ REACH_M = 0.025
 """A counterpart that is farther from the object than this is free."""
 TOUCHING_M, FREE_M = 0.003, 0.012
 """Up to the first gap a sample of the model's hand touches, beyond the second it is free of the object."""
-TOUCHING_SHARE = 0.5
+TOUCHING_SHARE = 0.65
 """Samples that touch are to have this share of the gap, or depth, of their counterparts, so that none is lost."""
 CONTACT_WEIGHT = 4.0
 TIP_WEIGHT = 6.0
