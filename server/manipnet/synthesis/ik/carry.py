@@ -41,7 +41,7 @@ STAY_WEIGHT_M2 = 5e-4
 """Pull toward the model's angles, in square metres per square radian."""
 CALM_WEIGHT_M2 = 1.5e-2
 """Pull toward the last tick's difference from the model's angles."""
-WRIST_WEIGHT = 1.0
+WRIST_WEIGHT = 0.35
 """Pull of the wrist toward where it is tracked."""
 WRIST_PACE = 0.15
 """Share of the way to a new shift of the wrist that one tick goes."""
