@@ -141,3 +141,14 @@ def test_a_wrong_hand_file_stops_the_start(tmp_path):
     server = LiveServer("--demo", "--hand", str(file))
     assert server.process.wait(120) == 1
     assert "has neither a left nor a right hand" in "".join(server.errors)
+
+
+def test_the_python_client_uploads_and_receives(server):
+    from manipnet_client import Client, ControlClient
+
+    control = ControlClient(server.addresses["control"])
+    name = control.upload_hand(as_content(scaled_profile(MODEL, 0.9, name="python")))
+    with Client(server.addresses["hands"], hand=name) as client:
+        hands = client.wait(timeout_s=20.0)
+        assert hands is not None
+        assert hands.left is not None

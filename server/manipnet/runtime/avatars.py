@@ -9,6 +9,7 @@ from typing import Final, Protocol
 from manipnet.actors.actor import Actor
 from manipnet.actors.avatar import Avatar
 from manipnet.actors.transitions import ShownHand
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import Tick
 from manipnet.wire import HandsMessage, Side
@@ -63,6 +64,10 @@ class Avatars:
     def names(self) -> dict[str, str]:
         """The actor of each profile by the profile's name."""
         return {name: entry.actor for name, entry in self._entries.items()}
+
+    def profiles(self) -> list[HandProfile]:
+        """The profiles of all avatars."""
+        return [entry.avatar.profile for entry in self._entries.values()]
 
     def show(self, actor: Actor, tick: Tick, hands: Mapping[Side, ShownHand], message: HandsMessage) -> None:
         """Publish the hands of the actor's avatars to which somebody has subscribed, for a tick just published."""

@@ -26,7 +26,7 @@ from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.tick_loop import TickLoop, TickObserver
 from manipnet.runtime.warm_up import carry_a_hand, pose_a_hand, warm_up
-from manipnet.synthesis.hand.profile import read_profile
+from manipnet.synthesis.hand.profile import profile_to_json, read_profile
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import Synthesizer
@@ -104,12 +104,14 @@ class Session:
     def recording_context(self) -> tuple[dict[str, str], list[Prop]]:
         """What a recording depends on: its metadata, and the props whose meshes it keeps. Raises `RequestError`."""
         props = self._proxy.ask(lambda: [prop for actor in self.actors for prop in actor.props])
+        profiles = self._proxy.ask(self.avatars.profiles)
         metadata = {
             "session": self.id,
             "version": __version__,
             "model": self.bundle.name,
             "model_hash": self.bundle.model_hash,
             "objects": carried_objects(props),
+            **{f"hand {profile.name}": profile_to_json(profile) for profile in profiles},
         }
         if self.config.rig is not None:
             with suppress(OSError, UnicodeDecodeError):  # a rig file that is gone must not prevent a recording
