@@ -38,7 +38,7 @@ BODY_REASONS = (
 
 CONTROL_OPS = (
     *("hello", "ping", "status", "objects", "mesh", "select_object", "add_object", "place_object", "calibrate"),
-    *("look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "invalid"),
+    *("hand_profile", "look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "invalid"),
 )
 
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -50,7 +50,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "connections_refused": ("reason", ("handshake", "socket_type", "not_listed", "too_many", "endless")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
-    "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),
+    "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish", "avatar")),
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
     "messages_out": ("topic", ()),
     "control_requests": ("op", CONTROL_OPS),
