@@ -62,19 +62,25 @@ def matches(bone: str, side: str, finger: int, part: int, thumb_metacarpal: bool
     It knows the names that are listed in `clients/README.md`. Rigs of VRM 1 and Godot have a `thumb_metacarpal`
     (`is_thumb_metacarpal`), and call the second bone of the thumb proximal.
     """
-    name, letter, number = _plain(bone), side[0], part + 1
+    name, letter = _plain(bone), side[0]
     if finger == 0 and bone[:-3] == "Thumb" and bone[-2:] in ("_L", "_R"):  # VRChat counts the thumb from zero
         return bone[-1].lower() == letter and bone[-3] == str(part)
     if is_thumb_metacarpal(bone, side):
         return (finger, part) == (0, 0)
     if finger == 0 and thumb_metacarpal and part < 2:
         return part == 1 and name in _by_part(side, "thumb", PARTS[0])
+    return name in finger_names(side, finger, part)
+
+
+def finger_names(side: str, finger: int, part: int) -> tuple[str, ...]:
+    """The names of a bone that are known whatever else a rig has, in lower case and without punctuation."""
+    letter, number = side[0], part + 1
     words = _WORDS.get(finger, (FINGERS[finger].lower(),))
-    if any(name in _by_part(side, word, PARTS[part]) for word in words):
-        return True
-    if name == f"bip01{letter}finger{finger}{part or ''}" or name == f"finger{finger + 1}{number}{letter}":
-        return True
-    return any(name == pattern % word for pattern in _patterns(side, number) for word in words)
+    return (
+        *(name for word in words for name in _by_part(side, word, PARTS[part])),
+        *(f"bip01{letter}finger{finger}{part or ''}", f"finger{finger + 1}{number}{letter}"),
+        *(pattern % word for pattern in _patterns(side, number) for word in words),
+    )
 
 
 def is_thumb_metacarpal(bone: str, side: str) -> bool:
@@ -84,8 +90,13 @@ def is_thumb_metacarpal(bone: str, side: str) -> bool:
 
 def is_hand(bone: str, side: str) -> bool:
     """Whether the name `bone` of a rig means the hand itself."""
+    return _plain(bone) in hand_names(side)
+
+
+def hand_names(side: str) -> tuple[str, ...]:
+    """The names of the hand bone, in lower case and without punctuation."""
     letter = side[0]
-    return _plain(bone) in (
+    return (
         *(f"{side}hand", f"mixamorig{side}hand", f"{side}wrist", f"wrist{letter}", f"chandfk{letter}"),
         *(f"{start}hand{letter}" for start in ("", "def")),
         *(f"{start}{letter}hand" for start in ("", "jbip", "ccbase", "bip01")),
