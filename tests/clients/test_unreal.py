@@ -1,8 +1,10 @@
 """The Unreal plugin: its descriptor, connection strings and skeleton, and its engine code on stubs of the engine."""
 
+import importlib.util
 import json
 import re
 import subprocess
+import zipfile
 
 import numpy as np
 import pytest
@@ -15,6 +17,12 @@ from manipnet.outputs.livelink.sender import hand_json
 
 PLUGIN = CLIENTS / "unreal" / "ManipNetLiveLink"
 GLUE = ROOT / "tests" / "clients" / "cpp"
+
+_spec = importlib.util.spec_from_file_location("unreal_package", CLIENTS / "unreal" / "package.py")
+assert _spec is not None
+assert _spec.loader is not None
+unreal_package = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(unreal_package)
 
 
 @pytest.fixture(scope="module", params=["g++", "clang++"])
@@ -30,6 +38,25 @@ def test_one_module_for_games_and_live_link_hub_and_no_library():
     assert (module["Name"], module["Type"]) == ("ManipNetLiveLink", "RuntimeAndProgram")
     assert plugin["SupportedPrograms"] == module["ProgramAllowList"] == ["LiveLinkHub"]
     assert {p["Name"] for p in plugin["Plugins"]} == {"LiveLink"}
+
+
+@pytest.mark.parametrize("engine", unreal_package.ENGINES)
+def test_zip_names_its_engine(engine, tmp_path):
+    with zipfile.ZipFile(unreal_package.write(engine, tmp_path)) as archive:
+        plugin = json.loads(archive.read("ManipNetLiveLink/ManipNetLiveLink.uplugin"))
+        names = set(archive.namelist())
+    assert plugin["EngineVersion"] == f"{engine}.0"
+    assert "ManipNetLiveLink/Source/ManipNetLiveLink/Public/ManipNetRetargetAsset.h" in names
+
+
+def test_stubs_agree_with_the_facts_that_were_read_in_the_engine(compiler):
+    subprocess.run([*compiler, "-fsyntax-only", str(GLUE / "facts.cpp")], check=True)
+
+
+def test_module_names_the_modules_whose_headers_it_includes():
+    rules = (MODULE / "ManipNetLiveLink.Build.cs").read_text(encoding="utf-8")
+    for module in ("Core", "CoreUObject", "Engine", "LiveLinkInterface", "LiveLinkAnimationCore", "Slate", "SlateCore"):
+        assert f'"{module}"' in rules
 
 
 def test_core_uses_no_engine_type():
@@ -57,9 +84,7 @@ def test_source_and_factory_on_stubs(compiler, tmp_path):
     assert lines["timecode"] == "1 2 3 4 1 30000/1001"
     wrist, body, placed = (np.array(lines[key].split(), float) for key in ("wrist", "body", "placed"))
     assert wrist[[0, 2]] == pytest.approx([0, 0], abs=1e-4)
-    assert body[1] == pytest.approx(
-        wrist[1], abs=1e-3
-    )  # the cube moves with the hand along our x, which is Unreal's -y
+    assert body[1] == pytest.approx(wrist[1], abs=1e-3)  # both move along our x, which is Unreal's -y
     assert 2 * np.arctan2(wrist[3], wrist[6]) == pytest.approx(
         wrist[1] / 100, abs=1e-4
     )  # a turn about our z is one about Unreal's x, and the left-handed axes turn it back

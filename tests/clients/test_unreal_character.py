@@ -20,6 +20,8 @@ from manipnet.outputs.axes import to_unreal
 from manipnet.outputs.livelink.sender import hand_json
 
 FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+UNTOUCHED = [0, 1, 2, 7]
+"""Columns of a local pose that no retarget may change: the position and the scale."""
 IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 METRES = 100.0
 """A rig of the tests has its proportions in metres; Unreal's are in centimetres."""
