@@ -1,8 +1,10 @@
 """The Unity package has the layout that Unity requires, and its components run on stubs of the engine."""
 
 import json
+import os
 import re
 import subprocess
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from checkout import CLIENTS, ROOT, VECTORS, need, publishing
 from languages import run
 from random_hand import posed
 from test_retarget import foreign_rig, shown_directions
+from unity_facts import FACTS, VERSIONS
 
 from manipnet.geometry import quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity
@@ -65,6 +68,24 @@ def printed(glue):
         done = subprocess.run([*glue, tcp], capture_output=True, encoding="utf-8", timeout=120)
     assert done.returncode == 0, done.stderr + done.stdout
     return {"address": tcp, "all": done.stdout} | dict(line.split(" ", 1) for line in done.stdout.splitlines())
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_engine_has_what_the_package_uses(version):
+    """Looks the facts up in a clone of Unity's reference source."""
+    clone = os.environ.get("MANIPNET_UNITY_REFERENCE")
+    if not clone:
+        pytest.skip("needs MANIPNET_UNITY_REFERENCE, a clone of github.com/Unity-Technologies/UnityCsReference")
+    for folders, signature in FACTS:
+        command = ["git", "-C", clone, "grep", "-qE", _pattern(signature), version, "--", *folders.split("|")]
+        assert subprocess.run(command, check=False).returncode == 0, f"{version} lacks {signature}"
+
+
+def _pattern(signature):
+    """A pattern that ignores how much space is between the words of a signature."""
+    words = re.findall(r"\w+|[^\w\s]", signature)
+    spaces = ["[[:space:]]+" if a[-1].isalnum() and b[0].isalnum() else "[[:space:]]*" for a, b in pairwise(words)]
+    return "".join(re.escape(word) + space for word, space in zip(words, [*spaces, ""], strict=True))
 
 
 def numbers(printed, *words):

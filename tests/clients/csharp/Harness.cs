@@ -49,6 +49,9 @@ static class Harness
             case "connect":
                 Connect(args[1].Split(','), int.Parse(args[2]));
                 return 0;
+            case "control":
+                Control(args[1]);
+                return 0;
             case "websocket":
                 WebSocket(args[1]);
                 return 0;
@@ -270,6 +273,32 @@ static class Harness
         {
             Console.WriteLine("error: " + error.Message);
         }
+    }
+
+    /// <summary>Sends a request for each line, with its op, names and values separated by tabs, and prints the reply.</summary>
+    static void Control(string address)
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            string[] words = line.Split('\t');
+            object[] fields = words.Skip(1).Select(Value).ToArray();
+            try
+            {
+                Console.WriteLine(new ControlClient(address, 5.0).Ask(words[0], fields));
+            }
+            catch (Exception error) when (error is RequestException || error is IOException || error is System.Net.Sockets.SocketException)
+            {
+                Console.WriteLine(error.GetType().Name + " " + error.Message);
+            }
+        }
+    }
+
+    static object Value(string word)
+    {
+        double number;
+        if (word == "true" || word == "false") return word == "true";
+        return double.TryParse(word, NumberStyles.Float, CultureInfo.InvariantCulture, out number) ? (object)number : word;
     }
 
     /// <summary>A web socket that a script drives.</summary>

@@ -45,6 +45,7 @@ namespace ManipNet.Client.Unity
                 EditorGUILayout.LabelField(receiver.name, receiver.Address);
                 Show(receiver.Stats);
             }
+            foreach (ManipNetControl control in Resources.FindObjectsOfTypeAll<ManipNetControl>()) Control(control);
             if (EditorApplication.isPlaying)
                 foreach (ManipNetRecorder recorder in Resources.FindObjectsOfTypeAll<ManipNetRecorder>()) Record(recorder);
             EditorGUILayout.Space();
@@ -115,6 +116,16 @@ namespace ManipNet.Client.Unity
             Undo.RecordObject(component, "Set up ManipNet hands");
             change();
             PrefabUtility.RecordPrefabInstancePropertyModifications(component);
+        }
+
+        static void Control(ManipNetControl control)
+        {
+            EditorGUILayout.Space();
+            EditorGUILayout.LabelField(control.name, control.IsBusy ? "waiting for the server" : control.LastReply);
+            if (GUILayout.Button("Record on the server")) control.Record("unity");
+            if (GUILayout.Button("Stop recording on the server")) control.StopRecording();
+            if (GUILayout.Button("Pause the server")) control.Pause(true);
+            if (GUILayout.Button("Continue")) control.Pause(false);
         }
 
         static void Record(ManipNetRecorder recorder)

@@ -124,7 +124,7 @@ namespace UnityEngine
 
     public enum HumanBodyBones
     {
-        LeftUpperArm = 11, RightUpperArm = 12, LeftLowerArm = 13, RightLowerArm = 14, LeftHand = 17, RightHand = 18,
+        LeftUpperArm = 13, RightUpperArm = 14, LeftLowerArm = 15, RightLowerArm = 16, LeftHand = 17, RightHand = 18,
         LeftThumbProximal = 24, RightThumbProximal = 39,
     }
 
@@ -207,7 +207,7 @@ namespace UnityEngine
         public Pose(Vector3 position, Quaternion rotation) { this.position = position; this.rotation = rotation; }
     }
 
-    public enum RuntimeInitializeLoadType { AfterSceneLoad, SubsystemRegistration = 4 }
+    public enum RuntimeInitializeLoadType { AfterSceneLoad, SubsystemRegistration }
 
     public sealed class RuntimeInitializeOnLoadMethodAttribute : Attribute
     {
