@@ -279,6 +279,12 @@ def test_bone_names_are_those_of_the_other_clients(core):
         assert line == expected, name
 
 
+def test_full_width_characters_are_those_of_ascii(core):
+    names = {"index_02_l": "Left 1 1", "LeftHandIndex3": "Left 1 2", "hand_R": "Right hand", "tail": "none"}
+    wide = ["".join(chr(ord(c) + 0xFEE0) for c in name) for name in names]
+    assert run(core, "names", text="".join(f"{name}\n" for name in wide)) == list(names.values())
+
+
 @pytest.mark.parametrize("language", ["gcc-sanitized", "csharp"])
 def test_bone_maps(harness, language):
     core = harness(language)

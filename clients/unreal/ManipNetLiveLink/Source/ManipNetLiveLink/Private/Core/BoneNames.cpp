@@ -11,11 +11,23 @@ bool IsAlphanumeric(char c) {
 
 char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
+/// The ASCII character that stands for a full-width one of Japanese rigs (U+FF01 to U+FF5E) at `at`, or 0 if none does.
+char HalfWidth(const std::string& name, std::size_t at) {
+    if (name.compare(at, 2, "\xEF\xBC") != 0 && name.compare(at, 2, "\xEF\xBD") != 0) return 0;
+    if (at + 2 >= name.size()) return 0;
+    const int code = (static_cast<unsigned char>(name[at + 1]) - 0xBC) * 64 + static_cast<unsigned char>(name[at + 2]) - 0x81;
+    return code >= 0 && code < 0x5E ? static_cast<char>(0x21 + code) : static_cast<char>(0);
+}
+
 /// The name in lower case, without its namespace and punctuation.
 std::string Plain(const std::string& name) {
     std::string plain;
-    for (std::size_t i = name.rfind(':') + 1; i < name.size(); ++i)
-        if (IsAlphanumeric(name[i])) plain += Lower(name[i]);
+    for (std::size_t i = name.rfind(':') + 1; i < name.size(); ++i) {
+        const char narrow = HalfWidth(name, i);
+        const char c = narrow != 0 ? narrow : name[i];
+        if (IsAlphanumeric(c)) plain += Lower(c);
+        if (narrow != 0) i += 2;
+    }
     return plain;
 }
 
