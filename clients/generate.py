@@ -157,17 +157,19 @@ def cpp_layout() -> str:
 
 def cpp_rig_names() -> str:
     """Names of bones in lower case and without punctuation, from the Python client's `retarget`."""
-    from manipnet_client.retarget import finger_names, hand_names
+    from manipnet_client.retarget import finger_names, hand_names, metacarpal_names
 
     lines = [f"// {NOTE}", "#pragma once", "", "namespace manipnet::rig_names {", ""]
     lines += ["/// A name in lower case, without its namespace and punctuation; the side is 0 (left) or 1 (right)."]
     lines += ["struct Hand {", "    const char* Name;", "    int Side;", "};", ""]
     lines += ["/// The bones count from the thumb's first to the little finger's last."]
     lines += ["struct Finger {", "    const char* Name;", "    int Side;", "    int Bone;", "};", ""]
-    lines += ["inline constexpr Hand kHands[] = {"]
-    for number, side in enumerate(("left", "right")):
-        lines += [f'    {{"{name}", {number}}},' for name in hand_names(side)]
-    lines += ["};", "", "inline constexpr Finger kFingers[] = {"]
+    for table, names_of in (("kHands", hand_names), ("kThumbMetacarpals", lambda side: metacarpal_names(side, 0))):
+        lines += [f"inline constexpr Hand {table}[] = {{"]
+        for number, side in enumerate(("left", "right")):
+            lines += [f'    {{"{name}", {number}}},' for name in names_of(side)]
+        lines += ["};", ""]
+    lines += ["inline constexpr Finger kFingers[] = {"]
     for number, side in enumerate(("left", "right")):
         for bone in range(15):
             names = finger_names(side, bone // 3, bone % 3)

@@ -85,7 +85,12 @@ def finger_names(side: str, finger: int, part: int) -> tuple[str, ...]:
 
 def is_thumb_metacarpal(bone: str, side: str) -> bool:
     """Whether the name `bone` means the first bone of a thumb, as in VRM 1 and Godot."""
-    return _plain(bone) == f"{side}thumbmetacarpal"
+    return _plain(bone) in metacarpal_names(side, 0)
+
+
+def metacarpal_names(side: str, finger: int) -> tuple[str, ...]:
+    """The names of the metacarpal bone of a finger, in lower case and without punctuation."""
+    return (f"{side}{FINGERS[finger].lower()}metacarpal",)
 
 
 def is_hand(bone: str, side: str) -> bool:

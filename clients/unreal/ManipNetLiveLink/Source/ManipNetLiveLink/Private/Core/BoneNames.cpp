@@ -54,26 +54,30 @@ std::vector<std::string> Renamed(const std::vector<std::string>& names, const Bo
     return known;
 }
 
-}  // namespace
-
-bool IsThumbMetacarpal(const std::string& bone, Side side) {
-    return Plain(bone) == (side == Side::Left ? "leftthumbmetacarpal" : "rightthumbmetacarpal");
-}
-
-bool IsHandName(const std::string& bone, Side side) {
+template <std::size_t N>
+bool IsOneOf(const rig_names::Hand (&table)[N], const std::string& bone, Side side) {
     const std::string plain = Plain(bone);
-    for (const rig_names::Hand& known : rig_names::kHands)
+    for (const rig_names::Hand& known : table)
         if (known.Side == static_cast<int>(side) && plain == known.Name) return true;
     return false;
 }
+
+}  // namespace
+
+bool IsThumbMetacarpal(const std::string& bone, Side side) { return IsOneOf(rig_names::kThumbMetacarpals, bone, side); }
+
+bool IsHandName(const std::string& bone, Side side) { return IsOneOf(rig_names::kHands, bone, side); }
 
 bool MatchesFinger(const std::string& bone, Side side, std::size_t finger, std::size_t part, bool thumbMetacarpal) {
     if (finger == 0 && IsVrchatThumb(bone))
         return bone[7] == (side == Side::Left ? 'L' : 'R') && bone[5] == static_cast<char>('0' + part);
     if (IsThumbMetacarpal(bone, side)) return finger == 0 && part == 0;
     const std::string plain = Plain(bone);
-    if (finger == 0 && thumbMetacarpal && part < 2)
-        return part == 1 && plain == (side == Side::Left ? "leftthumbproximal" : "rightthumbproximal");
+    if (finger == 0 && thumbMetacarpal && part < 2) {
+        const bool left = side == Side::Left;
+        return part == 1 && (plain == (left ? "leftthumbproximal" : "rightthumbproximal") ||
+                             plain == (left ? "thumbproximall" : "thumbproximalr"));
+    }
     const int wanted = static_cast<int>(3 * finger + part);
     for (const rig_names::Finger& known : rig_names::kFingers)
         if (known.Side == static_cast<int>(side) && known.Bone == wanted && plain == known.Name) return true;

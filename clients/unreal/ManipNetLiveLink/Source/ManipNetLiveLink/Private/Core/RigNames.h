@@ -41,6 +41,11 @@ inline constexpr Hand kHands[] = {
     {"bip01rhand", 1},
 };
 
+inline constexpr Hand kThumbMetacarpals[] = {
+    {"leftthumbmetacarpal", 0},
+    {"rightthumbmetacarpal", 1},
+};
+
 inline constexpr Finger kFingers[] = {
     {"leftthumbproximal", 0, 0},
     {"thumbproximall", 0, 0},
