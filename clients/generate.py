@@ -5,13 +5,15 @@ Run `python clients/generate.py` after changing the schema or the version; a tes
 
 import json
 import re
+import sys
 from pathlib import Path
 
 import numpy as np
 
 from manipnet import __version__
-from manipnet.geometry import SIDES, Side, matrix_to_quat
+from manipnet.geometry import SIDES, Side, compose, invert, matrix_to_quat
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import rig_names
 from manipnet.wire.bodies import MAX_BODIES
@@ -24,6 +26,7 @@ from manipnet.wire.hands import (
     MAX_PAYLOAD_BYTES,
     NAME_BYTES,
     STATES,
+    TIMED_HEADER,
     TOPIC_BIN,
     VERSION,
 )
@@ -47,6 +50,13 @@ ZERO_POSE = {
     "zero_rotations": matrix_to_quat(_zero_matrices).round(8) + 0.0,
 }
 """Joints `(22, 3)` and bone rotations `(17, 4)` of a right hand with all angles zero, in its wrist frame."""
+
+_zero_joints = pose_in_world(
+    shipped_hand(), ["right"], np.zeros((1, len(ANGLE_NAMES))), np.array([[0.0] * 6 + [1.0]]), 1.0
+)[1][0]
+_WRIST = OPENXR_JOINT_NAMES.index("wrist")
+REST_JOINTS = compose(invert(_zero_joints[[_WRIST] * len(_zero_joints)]), _zero_joints).round(8) + 0.0
+"""OpenXR joints `(26, 7)` of a right hand with all angles zero, in the frame of its wrist joint."""
 
 NAMES = {
     "states": STATES,
@@ -73,6 +83,8 @@ def constants() -> dict[str, int]:
     for record, dtype in RECORDS.items():
         out[f"{record}_bytes"] = dtype.itemsize
         out |= {f"{record}_{name}": offset for name, (_, offset) in _fields(dtype).items()}
+    out["timed_header_bytes"] = TIMED_HEADER.itemsize
+    out |= {f"header_{name}": _fields(TIMED_HEADER)[name][1] for name in ("timecode", "timecode_rate")}
     return out
 
 
@@ -145,6 +157,39 @@ def cpp_layout() -> str:
     return "\n".join([*lines, "", "}  // namespace manipnet::layout"]) + "\n"
 
 
+def cpp_rig_names() -> str:
+    """Names of bones in their plain form."""
+    lines = [f"// {NOTE}", "#pragma once", "", "namespace manipnet::rig_names {", ""]
+    lines += ["/// A name in lower case, without its namespace and punctuation; the side is 0 (left) or 1 (right)."]
+    lines += ["struct Hand {", "    const char* Name;", "    int Side;", "};", ""]
+    lines += ["/// The bones count from the thumb's first to the little finger's last."]
+    lines += ["struct Finger {", "    const char* Name;", "    int Side;", "    int Bone;", "};", ""]
+    for table, names_of in (
+        ("kHands", rig_names.hand_names),
+        ("kThumbMetacarpals", lambda side: rig_names.metacarpal_names(side, 0)),
+    ):
+        lines += [f"inline constexpr Hand {table}[] = {{"]
+        for number, side in enumerate(SIDES):
+            lines += [f'    {{"{name}", {number}}},' for name in names_of(side)]
+        lines += ["};", ""]
+    lines += ["inline constexpr Finger kFingers[] = {"]
+    for number, side in enumerate(SIDES):
+        for bone in range(15):
+            names = rig_names.finger_names(side, bone // 3, bone % 3)
+            lines += [f'    {{"{name}", {number}, {bone}}},' for name in names]
+    return "\n".join([*lines, "};", "", "}  // namespace manipnet::rig_names"]) + "\n"
+
+
+def cpp_rest_joints() -> str:
+    lines = [f"// {NOTE}", "#pragma once", "", "namespace manipnet {", ""]
+    lines += [
+        "/// OpenXR joints of a right hand with straight fingers, in the frame of its wrist joint: m, xyz and xyzw."
+    ]
+    lines += ["inline constexpr float kRestJoints[][7] = {"]
+    lines += [f"    {{{', '.join(f'{x}F' for x in row)}}}," for row in REST_JOINTS.tolist()]
+    return "\n".join([*lines, "};", "", "}  // namespace manipnet"]) + "\n"
+
+
 def javascript_layout() -> str:
     lines = [f"// {NOTE}"]
     lines += [f"export const {name.upper()} = {value};" for name, value in constants().items()]
@@ -211,12 +256,15 @@ def files() -> dict[Path, str]:
         FOLDER / "unity/com.manipnet.client/Runtime/Core/Layout.cs": csharp_layout(),
         FOLDER / "unity/com.manipnet.client/Runtime/Core/RigNameTable.cs": csharp_rig_names(),
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/Layout.h": cpp_layout(),
+        FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RestJoints.h": cpp_rest_joints(),
+        FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RigNames.h": cpp_rig_names(),
         FOLDER / "web/layout.js": javascript_layout(),
         **manifests(),
     }
 
 
 if __name__ == "__main__":
+    sys.path.insert(0, str(FOLDER / "python"))
     for path, text in files().items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8", newline="\n")
