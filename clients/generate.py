@@ -108,7 +108,7 @@ def python_layout() -> str:
     for name, table in ZERO_POSE.items():
         body = "".join(f"        {json.dumps(row.tolist())},\n" for row in table)
         lines += [f"{name.upper()} = np.array(\n    [\n{body}    ]\n)"]
-    for record, dtype in RECORDS.items():
+    for record, dtype in {**RECORDS, "timed_header": TIMED_HEADER}.items():
         lines += ["", f"{record.upper()} = np.dtype(", "    {", f'        "itemsize": {dtype.itemsize},']
         fields = [(name, _python_format(kind), offset) for name, (kind, offset) in _fields(dtype).items()]
         for key, column in (("names", 0), ("formats", 1), ("offsets", 2)):

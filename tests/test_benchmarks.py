@@ -8,7 +8,7 @@ from checkout import ROOT
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)
     for path in (ROOT / "benchmarks").rglob("*.py")
-    if path.name not in ("__init__.py", "blender_check.py", "straightforward.py")  # need Blender, or PyTorch
+    if path.name not in ("__init__.py", "straightforward.py")  # needs PyTorch
 )
 
 

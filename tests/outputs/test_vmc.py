@@ -1,10 +1,12 @@
 """VMC: bytes against the OSC specification, poses against a T-pose worked out by hand, and an independent reader."""
 
+import contextlib
 import io
 import select
 import socket
 import subprocess
 import time
+from dataclasses import replace
 
 import numpy as np
 from checkout import need
@@ -67,6 +69,7 @@ def test_a_bundle_fits_a_packet_and_has_what_the_specification_asks_for():
     assert bundle[20:40] == b"/VMC/Ext/OK\0,i\0\0" + b"\0\0\0\x01"
     assert bundle[44:64] == b"/VMC/Ext/T\0\0,f\0\0" + b"\x3f\xc0\0\0"
     assert bundle[68:100] == b"/VMC/Ext/Bone/Pos\0\0\0,sfffffff\0\0\0"
+    assert bundle[-28:] == b"/VMC/Ext/Blend/Apply\0\0\0\0,\0\0\0"
     names = [m.params[0] for m in OscBundle(bundle) if m.address == "/VMC/Ext/Bone/Pos"]
     assert len(set(names)) == 16
     assert {"RightHand", "RightThumbProximal", "RightLittleDistal"} <= set(names)
@@ -119,6 +122,48 @@ def test_rest_pose_correction_makes_bones_point_where_the_hand_does():
             turn = quat_multiply(turn, poses[f"Right{finger}{part}"][3:])
             x, y, z = (positions[end] - positions[start]) / np.linalg.norm(positions[end] - positions[start])
             np.testing.assert_allclose(quat_rotate(turn, np.array(straight)), [x, z, y], atol=1e-6)
+
+
+def received(*messages, **options):
+    """The datagrams that a sender with these options sends for messages."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.setblocking(False)
+        sender = VmcSender("127.0.0.1", receiver.getsockname()[1], HAND, **options)
+        sent = [sender.send(EncodedHands(message, b"", b"")) for message in messages]
+        sender.close()
+        datagrams = []
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                datagrams.append(OscBundle(receiver.recv(2048)))
+    return sent, datagrams
+
+
+def test_fingers_only_leave_the_hand_to_the_body_stream():
+    message = messages()["live"]
+    _, datagrams = received(message, fingers_only=True)
+    sent = {m.params[0]: m.params[1:] for bundle in datagrams for m in bundle if m.address == "/VMC/Ext/Bone/Pos"}
+    assert len(sent) == 30
+    assert not {"LeftHand", "RightHand"} & set(sent)
+    expected = poses_by_name(CORRECTED, "right", message.hands["right"])["RightThumbDistal"]
+    np.testing.assert_allclose(sent["RightThumbDistal"], expected, atol=1e-5)
+
+
+def test_one_receiver_gets_one_actor():
+    first = messages()["live"]
+    other = replace(first, actor="other")
+    sent, datagrams = received(first, other)
+    assert sent == [True, False]
+    assert len(datagrams) == 2
+    assert received(first, other, actor="other")[0] == [False, True]
+
+
+def test_each_datagram_is_applied_and_carries_the_time():
+    message = messages()["live"]
+    _, datagrams = received(message, replace(message, t_publish=message.t_publish + 0.5))
+    assert all([m.address for m in bundle][-1] == "/VMC/Ext/Blend/Apply" for bundle in datagrams)
+    times = [m.params[0] for bundle in datagrams for m in bundle if m.address == "/VMC/Ext/T"]
+    assert times == [0.0, 0.0, 0.5, 0.5]
 
 
 def test_read_by_an_independent_osc_tool():

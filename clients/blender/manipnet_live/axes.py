@@ -1,5 +1,8 @@
 """Conversion from the project's axes (right-handed, Y up) to Blender's (right-handed, Z up). Quaternions are xyzw."""
 
+from collections.abc import Sequence
+
+import mathutils
 import numpy as np
 
 from .manipnet_client.retarget import multiply
@@ -17,3 +20,15 @@ def to_blender(pose: np.ndarray) -> np.ndarray:
 def turned_to_blender(q: np.ndarray) -> np.ndarray:
     """A rotation `(4,)` in Blender's world whose local axes are unchanged, as those of a rig's bone must be."""
     return multiply(Y_UP_TO_Z_UP, q)
+
+
+def quaternion(xyzw: np.ndarray | Sequence[float]) -> mathutils.Quaternion:
+    """Blender's own quaternion for x, y, z, w."""
+    x, y, z, w = xyzw
+    return mathutils.Quaternion((w, x, y, z))
+
+
+def xyzw(rotation: mathutils.Quaternion) -> np.ndarray:
+    """The numbers x, y, z, w of Blender's own quaternion."""
+    w, x, y, z = rotation
+    return np.array([x, y, z, w])

@@ -2,85 +2,11 @@
 
 import bpy
 
-from .rig import RigError
 from .session import session
 
 
-class Settings(bpy.types.PropertyGroup):
-    """The settings, which Blender saves in the scene."""
-
-    address: bpy.props.StringProperty(
-        name="Server", default="tcp://127.0.0.1:5555", description="Address for hands in the server's line `ready`"
-    )
-    actor: bpy.props.StringProperty(
-        name="Actor", description="Actor whose hands are shown; empty for the first one received"
-    )
-    delay: bpy.props.FloatProperty(
-        name="Delay",
-        default=0.1,
-        min=0.0,
-        max=0.5,
-        unit="TIME_ABSOLUTE",
-        description="Time by which the hands are shown late, to bridge jitter and lost frames",
-    )
-    armature: bpy.props.PointerProperty(
-        name="Armature",
-        type=bpy.types.Object,
-        poll=lambda _, found: found.type == "ARMATURE",
-        description="Armature whose fingers follow; without one, empties show the joints",
-    )
-    follow_wrists: bpy.props.BoolProperty(
-        name="Follow wrists", description="Also move the hand bones to the tracked wrists"
-    )
-
-
-class MANIPNET_OT_connect(bpy.types.Operator):  # noqa: N801  (Blender requires such names)
-    """Receive hands and show them"""
-
-    bl_idname = "manipnet.connect"
-    bl_label = "Connect"
-
-    def execute(self, context):
-        chosen = context.scene.manipnet
-        try:
-            session.start(chosen.address, chosen.actor, chosen.delay, chosen.armature, chosen.follow_wrists)
-        except (ValueError, RigError) as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        return {"FINISHED"}
-
-
-class MANIPNET_OT_disconnect(bpy.types.Operator):  # noqa: N801  (Blender requires such names)
-    """Stop receiving"""
-
-    bl_idname = "manipnet.disconnect"
-    bl_label = "Disconnect"
-
-    def execute(self, context):
-        session.stop()
-        return {"FINISHED"}
-
-
-class MANIPNET_OT_record(bpy.types.Operator):  # noqa: N801  (Blender requires such names)
-    """Record the shown motion. Press again to make keyframes from it, starting at the current frame"""
-
-    bl_idname = "manipnet.record"
-    bl_label = "Record"
-
-    @classmethod
-    def poll(cls, context):
-        return session.can_record
-
-    def execute(self, context):
-        if session.is_recording:
-            self.report({"INFO"}, f"Made keyframes for {session.stop_recording()} frames")
-        else:
-            session.start_recording()
-        return {"FINISHED"}
-
-
 class MANIPNET_PT_panel(bpy.types.Panel):  # noqa: N801  (Blender requires such names)
-    """Connection, status and recording"""
+    """Connection, characters, status and recording"""
 
     bl_idname = "MANIPNET_PT_panel"
     bl_label = "ManipNet Live"
@@ -92,22 +18,53 @@ class MANIPNET_PT_panel(bpy.types.Panel):  # noqa: N801  (Blender requires such 
         layout, chosen = self.layout, context.scene.manipnet
         settings = layout.column()
         settings.enabled = not session.is_running
-        for name in ("address", "actor", "delay", "armature", "follow_wrists"):
+        for name in ("address", "delay", "show_props"):
             settings.prop(chosen, name)
-        if not session.is_running:
+        if chosen.show_props:
+            settings.prop(chosen, "control_address")
+        for index, character in enumerate(chosen.characters):
+            _draw_character(settings.box(), index, character)
+        settings.operator("manipnet.add_character", icon="ADD")
+        if session.is_running:
+            layout.operator("manipnet.disconnect", icon="PAUSE")
+            _draw_recording(layout, chosen)
+            _draw_status(layout)
+        else:
             layout.operator("manipnet.connect", icon="PLAY")
-            return
-        layout.operator("manipnet.disconnect", icon="PAUSE")
-        recording = session.is_recording
-        layout.operator(
-            "manipnet.record", text="Stop and make keyframes" if recording else "Record", icon="REC", depress=recording
-        )
-        stats = session.stats()
-        layout.label(text=stats.state)
+        for problem in session.problems:
+            layout.label(text=problem, icon="ERROR")
+
+
+def _draw_character(box, index: int, character) -> None:
+    row = box.row()
+    row.prop(character, "actor")
+    row.operator("manipnet.remove_character", text="", icon="X").index = index
+    for name in ("armature", "follow_wrists"):
+        box.prop(character, name)
+    if character.armature is None:
+        return
+    box.prop(character, "show_bones", icon="TRIA_DOWN" if character.show_bones else "TRIA_RIGHT")
+    if character.show_bones:
+        row = box.row()
+        for operator, icon in (("find_bones", "VIEWZOOM"), ("load_bone_map", "IMPORT"), ("save_bone_map", "EXPORT")):
+            row.operator(f"manipnet.{operator}", text="", icon=icon).index = index
+        for entry in character.bones:
+            box.prop_search(entry, "bone", character.armature.data, "bones", text=entry.name)
+
+
+def _draw_recording(layout, chosen) -> None:
+    recording = session.is_recording
+    text = "Stop and make keyframes" if recording else "Record"
+    layout.operator("manipnet.record", text=text, icon="REC", depress=recording)
+    for name in ("start_at", "within_scene", "keys_per_second"):
+        layout.prop(chosen, name)
+
+
+def _draw_status(layout) -> None:
+    for character in session.characters:
+        stats = character.stats()
+        layout.label(text=f"{character.shown.actor}: {stats.state}" if character.shown else stats.state)
         if stats.received:
             layout.label(text=f"{stats.rate_hz:.1f} Hz, age {1000 * stats.age_s:.0f} ms, {stats.lost} lost")
         else:
             layout.label(text="Nothing has arrived. Is the server running?", icon="INFO")
-
-
-CLASSES = (Settings, MANIPNET_OT_connect, MANIPNET_OT_disconnect, MANIPNET_OT_record, MANIPNET_PT_panel)

@@ -1,140 +1,172 @@
-"""Shows hands in the scene, on the bones of an armature or as empties at the joints."""
+"""Poses the hands of an armature, or shows hands as empties at their joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import bpy
-import mathutils
 import numpy as np
+from mathutils import Matrix, Quaternion, Vector
 
-from .axes import to_blender, turned_to_blender
+from .axes import quaternion, to_blender, turned_to_blender, xyzw
+from .bones import HandBones, find_hand
 from .manipnet_client import Hand
 from .manipnet_client.layout import JOINT_NAMES
-from .manipnet_client.retarget import (
-    FINGERS,
-    PARTS,
-    HandRig,
-    conjugate,
-    is_hand,
-    is_thumb_metacarpal,
-    matches,
-    multiply,
-    rotate,
-)
+from .manipnet_client.retarget import HandRig, rotate
+from .recording import Track
+from .scene import Reference, own_object, rotate_to, rotation_of
+from .wrist import local_pose, wrist_for
 
 
-class RigError(ValueError):
-    """An armature has no known fingers; the text names the missing bones."""
+@dataclass(frozen=True)
+class _FingerBone:
+    """How one finger bone is reached from the bones above it."""
 
-
-def _is_driven(bone_name: str) -> tuple[bool, bool]:
-    """Rigify's deforming bones follow its controls, and so do those of Auto-Rig Pro, whose controls begin with c_."""
-    return bone_name.startswith("DEF-"), not bone_name.startswith("c_")
+    name: str
+    row: int
+    """Its place among the 15 finger bones."""
+    parent: str | None
+    anchor: str | None
+    """The nearest finger bone above it, or None; helper bones may lie between."""
 
 
 class ArmatureHand:
     """One hand of an armature. With any rest pose, its bones point where the synthesised ones do."""
 
-    def __init__(self, armature: bpy.types.Object, side: str, follow_wrist: bool) -> None:
-        self._armature, self._side, self._follow_wrist = armature, side, follow_wrist
-        bones = {bone.name: bone for bone in sorted(armature.data.bones, key=lambda bone: _is_driven(bone.name))}
-        metacarpal = any(is_thumb_metacarpal(name, side) for name in bones)
-        hand = next((name for name in bones if is_hand(name, side)), None)
-        names = [
-            next((name for name in bones if matches(name, side, finger, part, metacarpal)), None)
-            for finger in range(len(FINGERS))
-            for part in range(len(PARTS))
-        ]
-        wanted = ["Hand"] + [finger + part for finger in FINGERS for part in PARTS]
-        missing = [part for part, name in zip(wanted, [hand, *names], strict=True) if name is None]
-        if missing:
-            raise RigError(f"{armature.name} has no bone for {', '.join(missing)} of the {side} hand")
-        self.bone_names = [str(name) for name in names]
-        self.hand_name = str(hand)
-        self.moved = [self.hand_name] if follow_wrist else []
-        self._bind(bones)
-
-    def _bind(self, bones: dict) -> None:
-        hand = bones[self.hand_name]
-        to_hand = conjugate(_rotation(hand.matrix_local))
-        origin = np.array(hand.head_local)
-        found = [bones[name] for name in self.bone_names]
-
-        def local(point: object) -> np.ndarray:
-            return rotate(to_hand, np.array(point) - origin)
-
-        self._rest = np.array([multiply(to_hand, _rotation(bone.matrix_local)) for bone in found])
-        heads = np.array([local(bone.head_local) for bone in found])
-        tips = np.array([local(bone.tail_local) for bone in found[2::3]])
-        self._rig = HandRig(self._side, heads, self._rest, tips)
-        parents = [bone.parent.name if bone.parent else "" for bone in found]
-        self._parents = [self.bone_names.index(name) if name in self.bone_names else -1 for name in parents]
-
-    def solve(self, hand: Hand) -> np.ndarray:
-        """The rotation of each bone from its rest pose, `(15, 4)` wxyz as in Blender."""
-        turned = self._rig.solve(hand)
-        basis = np.empty((len(turned), 4))
-        for i, parent in enumerate(self._parents):
-            basis[i] = multiply(conjugate(self._rest[i]), turned[i])
-            if parent >= 0:
-                carried = multiply(self._rest[parent], conjugate(turned[parent]))
-                basis[i] = multiply(conjugate(self._rest[i]), multiply(carried, turned[i]))
-        return basis[:, [3, 0, 1, 2]]
-
-    def keys(self, hand: Hand) -> tuple[np.ndarray, np.ndarray]:
-        """The values of keyframes: rotations wxyz of the bones `bone_names` and `moved`, and locations of `moved`."""
-        moved = [self._armature.pose.bones[name] for name in self.moved]
-        rotations = [np.array(bone.rotation_quaternion) for bone in moved]
-        locations = [np.array(bone.location) for bone in moved]
-        return np.vstack([self.solve(hand), *rotations]), np.array(locations).reshape(-1, 3)
+    def __init__(self, armature: bpy.types.Object, side: str, wrist: bool, bone_map: Mapping[str, str]) -> None:
+        """Raises `RigError` if the armature lacks the hand, or two fingers of it."""
+        self.bones = find_hand(armature, side, bone_map)
+        self._armature = Reference(armature)
+        self._rig = HandRig(side, *_bind_pose(armature, self.bones))
+        self._fingers = _finger_bones(armature, self.bones)
+        self._wrist = wrist_for(armature, side, self.bones) if wrist else None
+        self._wanted: Vector | None = None
+        self.distance_m = 0.0
+        """How far the hand was from the tracked wrist when Blender last computed the armature."""
 
     def show(self, hand: Hand, weight: float) -> None:
-        """Pose the bones; a `weight` below one blends with their present pose."""
-        bones = self._armature.pose.bones
-        if self._follow_wrist:
-            place = mathutils.Vector(to_blender(hand.wrist)[:3])
-            x, y, z, w = turned_to_blender(self._rig.hand_rotation(hand))
-            world = mathutils.Matrix.LocRotScale(place, mathutils.Quaternion((w, x, y, z)), None)
-            bones[self.hand_name].rotation_mode = "QUATERNION"
-            bones[self.hand_name].matrix = self._armature.matrix_world.inverted() @ world
-        for name, basis in zip(self.bone_names, self.solve(hand), strict=True):
-            bone = bones[name]
-            bone.rotation_mode = "QUATERNION"
-            if weight < 1.0:
-                basis = _mix(np.array(bone.rotation_quaternion), basis, weight)
-            bone.rotation_quaternion = basis
+        """Pose the bones, unless the armature is gone; a `weight` below one blends with their present pose."""
+        armature = self._armature.find()
+        if armature is None or not self._has_bones(armature):
+            return
+        bones = armature.pose.bones
+        pose = bones[self.bones.hand].matrix.copy()
+        if self._wrist is not None:
+            self._measure(armature)
+            wanted = self._wanted_pose(armature, hand)
+            self._wanted = armature.matrix_world @ wanted.to_translation()
+            self._wrist.place(armature, wanted)
+            pose = wanted
+        self._pose_fingers(bones, pose.to_quaternion(), hand, weight)
+
+    def new_track(self) -> Track:
+        """A track for a recording, which `record` adds to."""
+        wrist = self._wrist
+        fingers = tuple(bone.name for bone in self._fingers)
+        return Track(self._armature, (*fingers, *(wrist.rotated if wrist else ())), wrist.moved if wrist else ())
+
+    def record(self, track: Track, time_s: float) -> None:
+        """Add the present pose of the bones to a track of `new_track`."""
+        armature = self._armature.find()
+        if armature is None or not self._has_bones(armature):
+            return
+        bones = armature.pose.bones
+        solved = self._wrist.rotated if self._wrist is not None and not self._wrist.moved else ()
+        rotations = [
+            _shown_rotation(bones[name]) if name in solved else rotation_of(bones[name]) for name in track.rotated
+        ]
+        track.add(time_s, np.array(rotations), np.array([bones[name].location for name in track.moved]))
+
+    def release(self) -> None:
+        """Remove what is in the armature only while the hand is shown."""
+        armature = self._armature.find()
+        if armature is not None and self._wrist is not None:
+            self._wrist.release(armature)
+
+    def _has_bones(self, armature: bpy.types.Object) -> bool:
+        """Whether the user has not deleted or renamed a bone in the meantime."""
+        names = (self.bones.hand, *(bone.name for bone in self._fingers), *(self._wrist.rotated if self._wrist else ()))
+        return all(name in armature.pose.bones for name in names)
+
+    def _wanted_pose(self, armature: bpy.types.Object, hand: Hand) -> Matrix:
+        """The pose of the hand bone at the tracked wrist, in the armature's space and without its scale."""
+        to_armature = armature.matrix_world.inverted()
+        place = to_armature @ Vector(to_blender(hand.wrist)[:3])
+        turned = quaternion(turned_to_blender(self._rig.hand_rotation(hand)))
+        return Matrix.LocRotScale(place, to_armature.to_quaternion() @ turned, None)
+
+    def _measure(self, armature: bpy.types.Object) -> None:
+        if self._wanted is not None:
+            place = armature.matrix_world @ armature.pose.bones[self.bones.hand].head
+            self.distance_m = (place - self._wanted).length
+
+    def _pose_fingers(self, bones, hand_rotation: Quaternion, hand: Hand, weight: float) -> None:
+        """Turn the finger bones; poses of other bones above them are taken relative to the hand or finger above."""
+        evaluated_hand = bones[self.bones.hand].matrix.to_quaternion()
+        solved = self._rig.solve(hand)
+        shown: dict[str, Quaternion] = {}
+        for bone in self._fingers:
+            wanted = hand_rotation @ quaternion(solved[bone.row])
+            parent = None
+            if bone.parent is not None:
+                above = shown[bone.anchor] if bone.anchor else hand_rotation
+                before = bones[bone.anchor].matrix.to_quaternion() if bone.anchor else evaluated_hand
+                parent = above @ before.inverted() @ bones[bone.parent].matrix.to_quaternion()
+                parent = shown.get(bone.parent, parent).to_matrix().to_4x4()
+            target = bones[bone.name]
+            basis = local_pose(target, wanted.to_matrix().to_4x4(), parent).to_quaternion()
+            rotate_to(target, rotation_of(target).slerp(basis, weight) if weight < 1.0 else basis)
+            shown[bone.name] = wanted
 
 
 class JointEmpties:
     """One hand as empties at its 26 OpenXR joints, +y towards the finger tip. Missing empties are created."""
 
-    def __init__(self, side: str) -> None:
-        self._objects = []
-        for joint in JOINT_NAMES:
-            name = f"manipnet_{side}_{joint}"
-            found = bpy.data.objects.get(name) or self._create(name)
-            self._objects.append(found)
-
-    def _create(self, name: str) -> bpy.types.Object:
-        made = bpy.data.objects.new(name, None)
-        made.empty_display_type = "ARROWS"
-        made.empty_display_size = 0.01
-        made.rotation_mode = "QUATERNION"
-        bpy.context.scene.collection.objects.link(made)
-        return made
+    def __init__(self, side: str, actor: str = "") -> None:
+        start = f"manipnet_{actor}_{side}" if actor else f"manipnet_{side}"
+        self._names = [f"{start}_{joint}" for joint in JOINT_NAMES]
+        self._found = [Reference(own_object(name)) for name in self._names]
 
     def show(self, hand: Hand, weight: float) -> None:
         """Move the empties to the joints; after the stream has faded they stay in place."""
-        if weight > 0.0:
-            for found, joint in zip(self._objects, hand.joints, strict=True):
-                x, y, z, qx, qy, qz, qw = to_blender(joint)
-                found.location = (x, y, z)
-                found.rotation_quaternion = (qw, qx, qy, qz)
+        if weight == 0.0:
+            return
+        for i, joint in enumerate(hand.joints):
+            found = self._found[i].find()
+            if found is None or not found.users_collection:
+                found = own_object(self._names[i])
+                self._found[i] = Reference(found)
+            pose = to_blender(joint)
+            found.location = pose[:3]
+            rotate_to(found, quaternion(pose[3:]))
 
 
-def _mix(a: np.ndarray, b: np.ndarray, weight: float) -> np.ndarray:
-    mixed = (1.0 - weight) * a + weight * (b if a @ b >= 0.0 else -b)
-    return mixed / max(float(np.linalg.norm(mixed)), 1e-6)
+def _bind_pose(armature: bpy.types.Object, bones: HandBones) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The rest pose of the finger bones in the space of the hand bone, with NaN for a missing bone."""
+    hand = armature.data.bones[bones.hand]
+    to_hand, origin = xyzw(hand.matrix_local.inverted().to_quaternion()), np.array(hand.head_local)
+    positions, rotations, tips = np.full((15, 3), np.nan), np.full((15, 4), np.nan), np.full((5, 3), np.nan)
+    for row, name in enumerate(bones.fingers):
+        if name is not None:
+            bone = armature.data.bones[name]
+            positions[row] = rotate(to_hand, np.array(bone.head_local) - origin)
+            tips[row // 3] = rotate(to_hand, np.array(bone.tail_local) - origin)
+            rotations[row] = xyzw((hand.matrix_local.inverted() @ bone.matrix_local).to_quaternion())
+    return positions, rotations, tips
 
 
-def _rotation(matrix: object) -> np.ndarray:
-    """The rotation of a 4x4 matrix as a quaternion xyzw."""
-    w, x, y, z = mathutils.Matrix(matrix).to_quaternion()
-    return np.array([x, y, z, w])
+def _finger_bones(armature: bpy.types.Object, bones: HandBones) -> list[_FingerBone]:
+    """The finger bones that the armature has, from the hand outwards."""
+    out = []
+    for row, name in enumerate(bones.fingers):
+        if name is not None:
+            bone = armature.data.bones[name]
+            above = next((each.name for each in bone.parent_recursive if each.name in bones.fingers), None)
+            out.append(_FingerBone(name, row, bone.parent.name if bone.parent else None, above))
+    return sorted(out, key=lambda each: len(armature.data.bones[each.name].parent_recursive))
+
+
+def _shown_rotation(bone: bpy.types.PoseBone) -> Quaternion:
+    """The own rotation that shows the bone as it is now, with the effect of its constraints in it."""
+    return local_pose(bone, bone.matrix, bone.parent.matrix if bone.parent else None).to_quaternion()

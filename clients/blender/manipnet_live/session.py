@@ -1,34 +1,39 @@
-"""A session: the client reads on its own thread and never uses Blender, and a timer shows the hands."""
+"""A session: clients read on their own threads and never use Blender, and a timer shows the hands."""
+
+from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 import bpy
-import numpy as np
 
-from .manipnet_client import Client, Stats
+from .character import Cast, Character
+from .manipnet_client import Stats
 from .manipnet_client.zmtp import parse_address
-from .recording import Recording
-from .rig import ArmatureHand, JointEmpties
+from .props import Props
+from .recording import Bake, Recording, Track
+from .timecode import timecode_frames
 
 SHOW_EVERY_S = 1.0 / 60.0
 REDRAW_EVERY_S = 0.25
-SIDES = ("left", "right")
 
 
 class Session:
-    """The connection and the hands that it drives. Only Blender's main thread may call the methods."""
+    """The connections and the characters that they drive. Only Blender's main thread may call the methods."""
 
     def __init__(self) -> None:
-        self._client: Client | None = None
-        self._hands: dict[str, ArmatureHand | JointEmpties] = {}
+        self.characters: list[Character] = []
+        self.problem = ""
+        """Why the last session ended, if an error ended it."""
+        self._props: Props | None = None
         self._recording: Recording | None = None
-        self._armature: bpy.types.Object | None = None
+        self._prop_tracks: list[Track] = []
         self._redrawn_s = 0.0
 
     @property
     def is_running(self) -> bool:
-        """Whether the client is connected or tries to connect."""
-        return self._client is not None
+        """Whether the clients are connected or try to connect."""
+        return bool(self.characters)
 
     @property
     def is_recording(self) -> bool:
@@ -37,66 +42,157 @@ class Session:
 
     @property
     def can_record(self) -> bool:
-        """Whether there is an armature that can have keyframes."""
-        return self._armature is not None
+        """Whether there is an armature, or a prop, that can have keyframes."""
+        return self.is_running and (self._props is not None or any(each.can_record for each in self.characters))
+
+    @property
+    def problems(self) -> list[str]:
+        """What the user should know: missing bones, hands that do not reach their wrists, meshes that do not arrive."""
+        out = [self.problem] if self.problem else []
+        for character in self.characters:
+            out += character.problems
+            far = {side: far_m for side, far_m in character.distances_m().items() if far_m > 0.02}
+            out += [f"The {side} hand is {100 * far_m:.0f} cm from its wrist" for side, far_m in far.items()]
+        return out + ([self._props.problem] if self._props and self._props.problem else [])
 
     def stats(self) -> Stats:
-        """The statistics that the panel shows."""
-        return self._client.stats() if self._client else Stats(state="off")
+        """The statistics of the first character."""
+        return self.characters[0].stats() if self.characters else Stats(state="off")
 
-    def start(self, address: str, actor: str, delay_s: float, armature: bpy.types.Object | None, wrists: bool) -> None:
-        """Connect and show hands; raises `ValueError` for a wrong address and `RigError` for an unknown rig."""
+    def start(self, address: str, delay_s: float, cast: Sequence[Cast], control_address: str = "") -> None:
+        """Connect and show the cast, and props if there is a `control_address` for their meshes.
+
+        Raises `ValueError` for a wrong address and `RigError` for an unknown rig. Then nothing has been started.
+        """
         parse_address(address)
         self.stop()
-        self._hands = {s: ArmatureHand(armature, s, wrists) if armature else JointEmpties(s) for s in SIDES}
-        self._armature = armature
-        self._client = Client(address, actor or None, delay_s)
-        bpy.app.timers.register(self._tick, first_interval=0.0)
+        self.problem = ""
+        started: list[Character] = []
+        try:
+            for each in cast or (Cast(),):
+                started.append(Character(address, delay_s, each))
+            self._props = Props(control_address) if control_address else None
+        except ValueError:
+            for character in started:
+                character.close()
+            raise
+        self.characters = started
+        bpy.app.timers.register(self._tick, first_interval=0.0, persistent=True)
 
-    def stop(self) -> None:
-        """Disconnect, after writing the keyframes of a running recording."""
-        if self._client is None:
-            return
-        self.stop_recording()
-        client, self._client = self._client, None
-        if bpy.app.timers.is_registered(self._tick):
-            bpy.app.timers.unregister(self._tick)
-        client.close()
-        self._hands = {}
-        self._armature = None
+    def stop(self) -> int:
+        """Disconnect, after making the keyframes of a running recording; returns their number of frames."""
+        recording = self._recording
+        self._end()
+        return self._write(recording, "CURRENT", False, 0.0) if recording else 0
+
+    def stop_for_another_file(self) -> Recording | None:
+        """Disconnect before Blender opens another file; returns the running recording, which no file has yet."""
+        recording = self._recording
+        self._end()
+        return recording
+
+    def release(self) -> None:
+        """Remove what is in the scene only while the session runs, before it is saved; the next tick makes it again."""
+        for character in self.characters:
+            character.release()
 
     def start_recording(self) -> None:
         """Record the shown motion from now on."""
-        if self._armature:
-            names = [name for hand in self._hands.values() for name in (*hand.bone_names, *hand.moved)]
-            moved = [name for hand in self._hands.values() for name in hand.moved]
-            self._recording = Recording(self._armature, names, moved)
+        if not self.can_record:
+            return
+        self._recording = Recording({})
+        for character in self.characters:
+            self._recording.tracks += character.start_recording()
+        self._prop_tracks = self._props.new_tracks() if self._props else []
+        self._recording.tracks += self._prop_tracks
 
-    def stop_recording(self) -> int:
-        """Write the keyframes from the scene's current frame on; returns the number of frames."""
-        recording, self._recording = self._recording, None
-        if recording is None:
-            return 0
+    def stop_recording(
+        self, start_at: str = "CURRENT", within_scene: bool = False, keys_per_second: float = 0.0
+    ) -> int:
+        """Make the keyframes; returns the number of frames.
+
+        They begin at the scene's "CURRENT" frame, at its first frame ("SCENE"), or at the frame of the tracker's
+        "TIMECODE". `within_scene` leaves out what comes after the scene's end, which is moved otherwise. There is one
+        key for each frame if `keys_per_second` is 0.
+        """
+        recording = self._recording
+        self._stop_recording()
+        return self._write(recording, start_at, within_scene, keys_per_second) if recording else 0
+
+    def write_kept(self, recording: Recording) -> int:
+        """Make actions, without their objects, from a recording that ended because another file was opened."""
         scene = bpy.context.scene
-        return recording.write(scene.frame_current, scene.render.fps / scene.render.fps_base)
+        return recording.write(Bake(scene.frame_current, scene.render.fps / scene.render.fps_base, 0.0), attach=False)
+
+    def _write(self, recording: Recording, start_at: str, within_scene: bool, keys_per_second: float) -> int:
+        scene = bpy.context.scene
+        fps = scene.render.fps / scene.render.fps_base
+        first = float({"SCENE": scene.frame_start}.get(start_at, scene.frame_current))
+        timecode, rate_hz = recording.labels.get("timecode"), recording.labels.get("timecode_rate", fps)
+        if start_at == "TIMECODE" and timecode is not None:
+            first = timecode_frames(str(timecode), float(rate_hz)) / float(rate_hz) * fps
+        frames = recording.write(Bake(first, fps, keys_per_second, scene.frame_end if within_scene else None))
+        if frames and not within_scene:
+            scene.frame_end = max(scene.frame_end, int(first) + frames - 1)
+        return frames
+
+    def _end(self) -> None:
+        self._stop_recording()
+        characters, self.characters = self.characters, []
+        props, self._props = self._props, None
+        if bpy.app.timers.is_registered(self._tick):
+            bpy.app.timers.unregister(self._tick)
+        for character in characters:
+            character.close()
+        if props is not None:
+            props.close()
+
+    def _stop_recording(self) -> None:
+        self._recording, self._prop_tracks = None, []
+        for character in self.characters:
+            character.stop_recording()
 
     def _tick(self) -> float | None:
-        """Show the hands of this moment, however slow Blender is; returns seconds until the next call, None to end."""
-        if self._client is None:
+        """Show the hands of this moment; returns seconds until the next call, None to end."""
+        if not self.characters:
             return None
         now_s = time.monotonic()
-        shown = self._client.sample(now_s)
-        if shown is not None:
-            present = {side: hand for side in SIDES if (hand := shown.hands.hand(side)) is not None}
-            for side, hand in present.items():
-                self._hands[side].show(hand, shown.weight)
-            if self._recording is not None and len(present) == len(SIDES):
-                rotations, locations = zip(*(self._hands[side].keys(present[side]) for side in SIDES), strict=True)
-                self._recording.add(now_s, np.concatenate(rotations), np.concatenate(locations))
+        try:
+            self._show(now_s)
+        except ReferenceError:
+            pass  # Blender replaced its data between two lines, as undo does; the next tick finds it again
+        except Exception as error:
+            # An error would end the timer without a word; what was recorded until now is kept.
+            self.problem = f"Disconnected by an error: {type(error).__name__}: {error}"
+            self.stop()
+            raise
         if now_s - self._redrawn_s > REDRAW_EVERY_S:
             self._redrawn_s = now_s
             self._redraw()
         return SHOW_EVERY_S
+
+    def _show(self, now_s: float) -> None:
+        for character in self.characters:
+            character.show(now_s)
+            if self._props is not None and character.shown is not None:
+                self._props.show(character.shown.bodies)
+        if self._recording is not None:
+            bpy.context.view_layer.update()  # constraints must have moved the arms before their poses are recorded
+            self._note_timecode(self._recording)
+            for character in self.characters:
+                character.record(now_s)
+            if self._props is not None:
+                self._props.record(self._prop_tracks, now_s)
+
+    def _note_timecode(self, recording: Recording) -> None:
+        shown = self.characters[0].shown
+        if shown is None or shown.timecode is None or "timecode" in recording.labels:
+            return
+        if any(len(track) for track in recording.tracks):
+            return  # the first instant had no timecode, and a later one would move the take
+        recording.labels["timecode"] = shown.timecode
+        if shown.timecode_rate is not None:
+            recording.labels["timecode_rate"] = shown.timecode_rate
 
     def _redraw(self) -> None:
         for window in bpy.context.window_manager.windows:

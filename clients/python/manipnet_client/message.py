@@ -45,7 +45,11 @@ class Body:
 
 @dataclass(frozen=True)
 class Hands:
-    """Both hands and the tracked bodies at one instant, which is `t_capture` in seconds of the sender's clock."""
+    """Both hands and the tracked bodies at one instant, which is `t_capture` in seconds of the sender's clock.
+
+    `timecode` is the tracker's SMPTE timecode of the instant, "HH:MM:SS:FF" (";" before FF for drop frame), and
+    `timecode_rate` its frames per second; both are None where they are not known.
+    """
 
     session: str
     actor: str
@@ -57,6 +61,8 @@ class Hands:
     left: Hand | None
     right: Hand | None
     bodies: tuple[Body, ...]
+    timecode: str | None = None
+    timecode_rate: float | None = None
 
     def hand(self, side: str) -> Hand | None:
         """The hand of a side, "left" or "right"."""
@@ -86,6 +92,7 @@ def decode(payload: bytes) -> Hands:
         by_side.get("left"),
         by_side.get("right"),
         tuple(_body(record) for record in bodies),
+        *_timecode(payload, int(header["header_size"])),
     )
 
 
@@ -119,6 +126,16 @@ def _records(payload: bytes) -> tuple[Any, list[Any], list[Any]]:
         read(layout.HAND, sizes[0], sizes[1], hands),
         read(layout.BODY, first_body, sizes[2], bodies),
     )
+
+
+def _timecode(payload: bytes, header_size: int) -> tuple[str | None, float | None]:
+    """The timecode and its rate, which only a longer header has."""
+    if header_size < layout.TIMED_HEADER.itemsize:
+        return None, None
+    header = np.frombuffer(payload, layout.TIMED_HEADER, 1)[0]
+    rate = float(header["timecode_rate"])
+    _require_finite("header", np.array(rate))
+    return _text(header["timecode"]) or None, rate or None
 
 
 def _hand(record: Any) -> Hand:

@@ -20,27 +20,35 @@ BONES = np.arange(2, 17)
 
 _ENDS = np.array([17 + i // 3 if i % 3 == 2 else 3 + i for i in range(15)])
 _PARENTS = (-1, 0, 1, 2, 3, 0, 5, 6, 0, 8, 9, 0, 11, 12, 0, 14, 15)
-_INDEX, _MIDDLE, _LITTLE = 3, 6, 12
+_KNUCKLES = (3, 6, 9, 12)
 
 
 class HandRig:
     """Poses the finger bones of one hand of a rig.
 
     The bind pose is given in the space of the rig's hand bone: `positions (15, 3)` and `rotations (15, 4)`, thumb to
-    little finger, proximal to distal, and `tips (5, 3)`.
+    little finger, proximal to distal, and `tips (5, 3)`, the end of each finger's last bone. The rows of bones that the
+    rig lacks are NaN. Raises `ValueError` if fewer than two fingers beside the thumb have a first bone.
     """
 
     def __init__(self, side: str, positions: np.ndarray, rotations: np.ndarray, tips: np.ndarray) -> None:
         flip = 1.0 if side == "right" else -1.0
         zero_p = ZERO_POSITIONS * [flip, 1.0, 1.0]
         zero_q = ZERO_ROTATIONS * [1.0, flip, flip, 1.0]
-        ours = _frame(zero_p[BONES[_MIDDLE]], zero_p[BONES[_INDEX]] - zero_p[BONES[_LITTLE]])
-        theirs = _frame(positions[_MIDDLE], positions[_INDEX] - positions[_LITTLE])
+        present = ~np.isnan(positions[:, 0])
+        knuckles = [i for i in _KNUCKLES if present[i]]
+        if len(knuckles) < 2:
+            raise ValueError("the rig needs the first bones of at least two fingers beside the thumb")
+        first, last = knuckles[0], knuckles[-1]
+        middle = 6 if present[6] else first
+        ours = _frame(zero_p[BONES[middle]], zero_p[BONES[first]] - zero_p[BONES[last]])
+        theirs = _frame(positions[middle], positions[first] - positions[last])
         self.wrist_to_hand = multiply(theirs, conjugate(ours))
-        self._bind = np.empty((15, 4))
-        for i in range(15):
-            end = tips[i // 3] if i % 3 == 2 else positions[i + 1]
-            wanted = rotate(self.wrist_to_hand, zero_p[_ENDS[i]] - zero_p[BONES[i]])
+        self._bind = np.tile([0.0, 0.0, 0.0, 1.0], (15, 1))
+        for i in np.flatnonzero(present):
+            below = [j for j in range(i + 1, 3 * (i // 3) + 3) if present[j]]
+            end, our_end = (positions[below[0]], BONES[below[0]]) if below else (tips[i // 3], _ENDS[i])
+            wanted = rotate(self.wrist_to_hand, zero_p[our_end] - zero_p[BONES[i]])
             turned = multiply(from_to(end - positions[i], wanted), rotations[i])
             back = multiply(conjugate(zero_q[BONES[i]]), conjugate(self.wrist_to_hand))
             self._bind[i] = multiply(back, turned)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from manipnet.common.options import Endpoint, HostPort, option
+from manipnet.common.options import Endpoint, HostPort, Switch, Text, option
 from manipnet.outputs.declaration import Emission, HandsOutput, Output
 
 DEFAULT_PORT = 39539
@@ -13,6 +13,10 @@ class VmcOptions:
     """Where VMC bones are sent."""
 
     vmc: Endpoint | None = option(None, HostPort(DEFAULT_PORT), "send VMC bones to that program, OSC over UDP")
+    vmc_fingers_only: bool = option(
+        False, Switch(), "leave the hand bones out of VMC, because another program moves the body"
+    )
+    vmc_actor: str | None = option(None, Text("NAME"), "actor that is sent over VMC; without it, the first one")
 
 
 def _open(options: VmcOptions, emission: Emission) -> HandsOutput:
@@ -20,7 +24,8 @@ def _open(options: VmcOptions, emission: Emission) -> HandsOutput:
     from manipnet.outputs.vmc.sender import VmcSender
 
     assert options.vmc is not None  # `open_outputs` opens what is turned on
-    return VmcSender(*resolve(*options.vmc), emission.hand)
+    host, port = resolve(*options.vmc)
+    return VmcSender(host, port, emission.hand, options.vmc_fingers_only, options.vmc_actor)
 
 
 VMC = Output("vmc", "VMC bones, OSC over UDP, for programs that show avatars", VmcOptions, _open)

@@ -1,7 +1,8 @@
 """The poses of a VMC receiver's bones for the pose of a hand.
 
 Rotations are local and relative to the receiver's T-pose (arms out, palms down, fingers straight), left-handed, Y up,
-as in Unity. Source: VMC protocol specification, marionette side.
+as in Unity. The arms are not tracked, so the hand's rotation is right below an arm in T-pose; where another program
+moves the arms, only the fingers fit. Source: VMC protocol specification, marionette side.
 """
 
 import numpy as np
