@@ -8,7 +8,6 @@ network's; it is given up when the hand lets go. An object that lies where it la
 
 import numpy as np
 
-from manipnet.geometry import Array
 from manipnet.jit import inner, matrix, stack_array
 from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_CAPSULES, MAX_JOINTS
 from manipnet.synthesis.hand.kinematics import pose_finger_into
