@@ -273,7 +273,8 @@ struct FLiveLinkSubjectKey {
 struct FLiveLinkSourceBufferManagementSettings {
     float EngineTimeOffset = 0.0f;
 };
-struct ULiveLinkSourceSettings : UObject {
+class ULiveLinkSourceSettings : public UObject {
+public:
     FString ConnectionString;
     FLiveLinkSourceBufferManagementSettings BufferSettings;
     static UClass* StaticClass() {

@@ -5,6 +5,7 @@
 #include "HAL/PlatformTime.h"
 #include "ILiveLinkClient.h"
 #include "ManipNetLiveLinkSourceSettings.h"
+#include "ManipNetSettings.h"
 #include "Misc/FrameRate.h"
 #include "Misc/QualifiedFrameTime.h"
 #include "Misc/Timecode.h"
@@ -59,50 +60,10 @@ FName SubjectName(const manipnet::HandsFrame& Frame, const FString& Part)
 {
     return FName(*FString::Printf(TEXT("ManipNet_%s_%s"), UTF8_TO_TCHAR(Frame.Actor.Text), *Part));
 }
-
-std::string ToText(const FString& Text)
-{
-    return std::string(TCHAR_TO_UTF8(*Text));
-}
-
-/// The connection that the settings describe, or what is wrong with their address.
-std::string ReadSettings(const UManipNetLiveLinkSourceSettings& Settings, manipnet::Connection& To)
-{
-    const std::string Problem = manipnet::ParseConnection(ToText(Settings.Address), To);
-    To.Actor = ToText(Settings.Actor);
-    To.DelayS = Settings.Delay;
-    To.Delivery = Settings.Delivery == EManipNetDelivery::Raw ? manipnet::Mode::Raw : manipnet::Mode::Smooth;
-    To.Place.YawDegrees = Settings.Yaw;
-    To.Place.Origin = {Settings.Origin.X, Settings.Origin.Y, Settings.Origin.Z};
-    To.Place.Scale = Settings.Scale;
-    return Problem;
-}
-
-void ShowSettings(const manipnet::Connection& From, UManipNetLiveLinkSourceSettings& Settings)
-{
-    Settings.Address = UTF8_TO_TCHAR(manipnet::FormatAddress(From).c_str());
-    Settings.Actor = UTF8_TO_TCHAR(From.Actor.c_str());
-    Settings.Delay = From.DelayS;
-    Settings.Delivery = From.Delivery == manipnet::Mode::Raw ? EManipNetDelivery::Raw : EManipNetDelivery::Smooth;
-    Settings.Yaw = From.Place.YawDegrees;
-    Settings.Origin = FVector(From.Place.Origin.X, From.Place.Origin.Y, From.Place.Origin.Z);
-    Settings.Scale = From.Place.Scale;
-}
-
-/// What Live Link itself must know: a preset makes the source again from the connection string, and raw frames are shown
-/// the delay late, so that there is a later one to interpolate to.
-void ShowInLiveLink(const manipnet::Connection& From, ULiveLinkSourceSettings& Settings)
-{
-    Settings.ConnectionString = UTF8_TO_TCHAR(manipnet::FormatConnection(From).c_str());
-    if (From.Delivery == manipnet::Mode::Raw)
-    {
-        Settings.BufferSettings.EngineTimeOffset = static_cast<float>(From.DelayS);
-    }
-}
 }
 
 FManipNetLiveLinkSource::FManipNetLiveLinkSource(const FString& ConnectionString)
-    : Error(manipnet::ParseConnection(ToText(ConnectionString), Connection))
+    : Error(manipnet::ParseConnection(ManipNetSettings::ToText(ConnectionString), Connection))
 {
 }
 
@@ -122,8 +83,8 @@ void FManipNetLiveLinkSource::InitializeSettings(ULiveLinkSourceSettings* Settin
 {
     if (UManipNetLiveLinkSourceSettings* Own = Cast<UManipNetLiveLinkSourceSettings>(Settings))
     {
-        ShowSettings(CurrentConnection(), *Own);
-        ShowInLiveLink(CurrentConnection(), *Own);
+        ManipNetSettings::Show(CurrentConnection(), *Own);
+        ManipNetSettings::ShowInLiveLink(CurrentConnection(), *Own);
     }
 }
 
@@ -135,7 +96,7 @@ void FManipNetLiveLinkSource::OnSettingsChanged(ULiveLinkSourceSettings* Setting
         return;
     }
     manipnet::Connection Wanted;
-    const std::string Problem = ReadSettings(*Own, Wanted);
+    const std::string Problem = ManipNetSettings::Read(*Own, Wanted);
     const manipnet::Connection Before = CurrentConnection();
     const bool bRestart = Problem != Error || !Wanted.SameStream(Before);
     {
@@ -144,7 +105,7 @@ void FManipNetLiveLinkSource::OnSettingsChanged(ULiveLinkSourceSettings* Setting
     }
     if (Problem.empty())
     {
-        ShowInLiveLink(Wanted, *Own);
+        ManipNetSettings::ShowInLiveLink(Wanted, *Own);
     }
     if (bRestart)
     {
