@@ -5,7 +5,6 @@ Run `python clients/generate.py` after changing the schema or the version; a tes
 
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -264,7 +263,6 @@ def files() -> dict[Path, str]:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(FOLDER / "python"))
     for path, text in files().items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8", newline="\n")
