@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from manipnet.geometry import Array
+from manipnet.inputs.timecode_rate import TimecodeRate
 from manipnet_tools.takes.motive_frames import read_frames
 from manipnet_tools.takes.motive_table import Columns, MotiveCsvError, Table, read_table
 from manipnet_tools.takes.text_file import read_text
+from manipnet_tools.takes.timecode_track import TimecodeTrack
 
 UNITS_M: Final = {"meters": 1.0, "centimeters": 0.01, "millimeters": 0.001}
 EULER_ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
@@ -43,6 +45,7 @@ class MotiveCsv:
     rate_hz: float
     time_s: Array
     bodies: dict[str, tuple[Array, NDArray[np.bool_]]]
+    timecode: TimecodeTrack | None = None
 
 
 def read_motive_csv(path: Path) -> MotiveCsv:
@@ -70,7 +73,13 @@ def _motive_csv(table: Table, where: str) -> MotiveCsv:
     announced = options.get("Total Exported Frames", "")
     if announced.isdigit() and int(announced) != len(numbers):
         _log.warning("%s: announces %s frames but has %d, which are used", where, announced, len(numbers))
-    return MotiveCsv(round(rate_hz, 3), (numbers - numbers[0]) * step_s, bodies)
+    return MotiveCsv(round(rate_hz, 3), (numbers - numbers[0]) * step_s, bodies, _timecode(table))
+
+
+def _timecode(table: Table) -> TimecodeTrack | None:
+    """The timecode of the frames. No cell states its rate, so the frame numbers tell it."""
+    rate = TimecodeRate()
+    return TimecodeTrack.of([(text, rate.note(text)) if text else (None, None) for text in table.timecodes])
 
 
 def _unit(options: dict[str, str]) -> float:

@@ -3,7 +3,8 @@
 Above the line `Frame,Time,…`, the head has one row each for the type, the name and, from version to version, the ID and
 the parent of a column, then `Rotation` or `Position`; the component stands in the line `Frame,Time,…` itself. Before
 Motive 2 the second column of these rows was empty; since then it says `Type`, `Name`, `ID` and `Parent`. A spreadsheet
-may have saved the file with semicolons or tabs between the cells, and with decimal commas.
+may have saved the file with semicolons or tabs between the cells, and with decimal commas. With timecode, the column of
+the time, or one more, holds HH:MM:SS:FF.
 """
 
 import csv
@@ -17,6 +18,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array
+from manipnet.wire.timecode import is_timecode
 
 TYPES: Final = ("rigid body", "bone")
 PARTS: Final = ("Rotation", "Position")
@@ -56,6 +58,8 @@ class Table:
     """`(T,)`, rounded; NaN where a time is missing."""
     values: Array
     """`(T, C)`; NaN for an empty cell."""
+    timecodes: tuple[str, ...] = ()
+    """HH:MM:SS:FF of each frame, or "" where there is none; empty for a file without timecode."""
 
 
 def read_table(text: str, where: str) -> Table:
@@ -89,7 +93,8 @@ def read_table(text: str, where: str) -> Table:
     placed = {
         name: Columns(_placed(body.rotation, place), _placed(body.position, place)) for name, body in bodies.items()
     }
-    return Table(options, placed, frames, times_s, numbers[:, 1:])
+    timecodes = _timecodes(lines[first], [cells for _, cells in body])
+    return Table(options, placed, frames, times_s, numbers[:, 1:], timecodes)
 
 
 def _separators(text: str) -> tuple[str, bool]:
@@ -202,6 +207,20 @@ def _time(cells: list[str], decimal_commas: bool) -> float:
         return _number(cells, 1, 0, decimal_commas)
     except MotiveCsvError:
         return np.nan
+
+
+def _timecodes(components: list[str], rows: list[list[str]]) -> tuple[str, ...]:
+    """The timecode of each row, from a column called Timecode, or from a time column that holds timecode.
+
+    What follows the frame number after a point is the number of a subframe, which is left out.
+    """
+    named = [c for c, cell in enumerate(components) if cell.replace(" ", "").strip().lower().startswith("timecode")]
+    for column in (*named, 1):
+        cells = [cells[column].strip().partition(".")[0] if column < len(cells) else "" for cells in rows]
+        texts = tuple(cell if is_timecode(cell) else "" for cell in cells)
+        if any(texts):
+            return texts
+    return ()
 
 
 def _placed(columns: dict[str, int], place: dict[int, int]) -> dict[str, int]:

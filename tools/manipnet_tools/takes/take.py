@@ -133,7 +133,7 @@ def _read_motive_csv(path: Path, keep: Collection[str]) -> Take:
     motive = read_motive_csv(path)
     names = take_names(motive.bodies, keep)
     bodies = {names[name]: BodyTrack(*track) for name, track in motive.bodies.items()}
-    return Take(path.stem, motive.rate_hz, motive.time_s, bodies)
+    return Take(path.stem, motive.rate_hz, motive.time_s, bodies, timecode=motive.timecode)
 
 
 def _y_up(take: Take) -> Take:
