@@ -137,6 +137,13 @@ class Folder(Kind):
         return str(value.resolve())
 
 
+class File(Folder):
+    """The path of a file. In a rig file, a relative path starts at the file's own folder."""
+
+    metavar = "FILE"
+    allowed = "the path of a file, as text"
+
+
 @dataclass(frozen=True)
 class HostPort(Kind):
     """The address of another program, with a default port."""
