@@ -125,3 +125,14 @@ def test_only_keys_need_pyzmq(control, keys, monkeypatch):
     assert control.ask("hello")["version"] == __version__
     with pytest.raises(ImportError, match=r"pip install .*curve"):
         ControlClient("tcp://127.0.0.1:5557", keys=keys / "listed.toml")
+
+
+def test_requests_as_methods(control):
+    assert 0.0 < control.look_ahead(0.2) <= 0.5
+    name = control.record("by the client")
+    assert name.startswith("by")
+    assert control.stop_recording()["name"] == name
+    shape = control.ask("objects")["objects"][0]
+    assert control.select_object("Box", shape, 0.9)["scale"] == 0.9
+    with pytest.raises(RequestError, match="object"):
+        control.select_object("Box", "nothing of this name")
