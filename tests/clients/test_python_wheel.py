@@ -43,7 +43,7 @@ def test_the_wheel_is_typed_and_described(wheel: Path) -> None:
 def test_a_program_reads_hands_with_the_installed_wheel(wheel: Path, tmp_path: Path) -> None:
     environment = tmp_path / "environment"
     venv.create(environment, with_pip=True)
-    python = next(environment.glob("*/python*"))
+    python = next(environment.glob("*/python.exe"), environment / "bin" / "python")
     done = subprocess.run(
         [python, "-m", "pip", "install", "-q", str(wheel)], capture_output=True, text=True, timeout=180
     )
