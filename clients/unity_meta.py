@@ -10,6 +10,21 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent / "unity" / "com.manipnet.client"
 IMPORTERS = {".cs": "MonoImporter", ".asmdef": "AssemblyDefinitionImporter", ".md": "TextScriptImporter"}
 IMPORTERS |= {"package.json": "PackageManifestImporter", ".png": "TextureImporter", ".svg": "DefaultImporter"}
+IMPORTERS |= {".jslib": "PluginImporter"}
+WEBGL_ONLY = """  serializedVersion: 2
+  platformData:
+  - first:
+      Any:
+    second:
+      enabled: 0
+      settings: {}
+  - first:
+      WebGL: WebGL
+    second:
+      enabled: 1
+      settings: {}
+"""
+"""The settings of a browser script: no other platform compiles it."""
 
 
 def files(package: Path) -> dict[Path, str]:
@@ -22,8 +37,9 @@ def _meta(asset: Path, package: Path) -> str:
     guid = hashlib.md5(f"com.manipnet.client/{asset.relative_to(package).as_posix()}".encode()).hexdigest()
     folder = "folderAsset: yes\n" if asset.is_dir() else ""
     importer = "DefaultImporter" if asset.is_dir() else IMPORTERS.get(asset.name) or IMPORTERS[asset.suffix]
+    settings = WEBGL_ONLY if asset.suffix == ".jslib" else ""
     return (
-        f"fileFormatVersion: 2\nguid: {guid}\n{folder}{importer}:\n  externalObjects: {{}}\n"
+        f"fileFormatVersion: 2\nguid: {guid}\n{folder}{importer}:\n  externalObjects: {{}}\n{settings}"
         "  userData:\n  assetBundleName:\n  assetBundleVariant:\n"
     )
 

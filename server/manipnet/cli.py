@@ -34,8 +34,8 @@ EPILOG = """examples:
   manipnet-serve --mesh Box=mug.obj                       track the bodies left_wrist, right_wrist and Box
   manipnet-serve --rig stage.toml --look-ahead 0.1        read from a file which bodies are tracked
   manipnet-serve --set bodies.left_wrist=3 --mesh 7=mug   name bodies by streaming id; use a mug of the library
-All options but --rig, --mesh, --set, --print-config and --log-format may also be in the [server] table of the rig file;
-the command line overrides the file."""
+All options but --rig, --mesh, --hand, --set, --print-config and --log-format may also be in the [server] table of the
+rig file; the command line overrides the file."""
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -53,6 +53,12 @@ def build_parser() -> argparse.ArgumentParser:
     tracked.add_argument("--rig", type=Path, metavar="FILE", help="rig file: which body is which wrist or prop")
     tracked.add_argument(
         "--mesh", action="append", default=[], metavar="NAME=FILE", help="body NAME carries the mesh FILE; repeatable"
+    )
+    tracked.add_argument(
+        "--hand",
+        type=Path,
+        metavar="HAND.json",
+        help="also solve the first actor's hands on this avatar's hand; see docs/any-hand.md",
     )
     tracked.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the rig file; repeatable"
@@ -112,7 +118,8 @@ def configure(arguments: argparse.Namespace) -> ServerConfig:
 
     rig = load_rig(arguments.rig, arguments.set)
     first, *others = rig.actors
-    actors = (replace(first, objects=first.objects + objects), *others)
+    first = replace(first, objects=first.objects + objects, hand=arguments.hand or first.hand)
+    actors = (first, *others)
     return server_config(actors, rig.server | flags, arguments.rig)
 
 
@@ -135,6 +142,7 @@ def _serve(config: ServerConfig, json_log: bool) -> int:
     from manipnet.runtime.console import Console
     from manipnet.runtime.signals import stop_on_signals
     from manipnet.server import Server
+    from manipnet.synthesis.hand.profile import ProfileError
     from manipnet.synthesis.objects.mesh import MeshError
 
     console = Console(as_json=json_log)
@@ -145,7 +153,7 @@ def _serve(config: ServerConfig, json_log: bool) -> int:
         with stop_on_signals() as stop:
             server = Server(config, console.say, precompiler.wait)
             server.run(stop.is_set)
-    except (ConfigError, BundleError, MeshError, KeyFileError, ListenError) as error:
+    except (ConfigError, BundleError, MeshError, ProfileError, KeyFileError, ListenError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
     finally:

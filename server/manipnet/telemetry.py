@@ -9,6 +9,7 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -37,7 +38,7 @@ BODY_REASONS = (
 
 CONTROL_OPS = (
     *("hello", "ping", "status", "objects", "mesh", "select_object", "add_object", "place_object", "calibrate"),
-    *("look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "invalid"),
+    *("hand_profile", "look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "invalid"),
 )
 
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -49,7 +50,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "connections_refused": ("reason", ("handshake", "socket_type", "not_listed", "too_many", "endless", "token")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
-    "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish")),
+    "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish", "avatar")),
     "output_guarded": ("reason", ("not_finite", "limit", "speed")),
     "messages_out": ("topic", ()),
     "control_requests": ("op", CONTROL_OPS),
@@ -91,14 +92,27 @@ class Telemetry:
 
         Raises `KeyError` for a counter or a label value that is not declared.
         """
+        self._add(self._key(name, label), n)
+
+    def counter(self, name: str, **label: str) -> Callable[[], None]:
+        """A function that raises a counter by one, for what is counted so often that its label is checked only once.
+
+        Raises `KeyError` as `count` does.
+        """
+        return partial(self._add, self._key(name, label), 1)
+
+    def _key(self, name: str, label: Mapping[str, str]) -> tuple[str, str]:
         key, allowed = self._labels[name]
         value = label[key]
         if value not in allowed:
             raise KeyError(f"{name}: {key} {value!r} is not declared; allowed are {', '.join(allowed)}")
+        return name, value
+
+    def _add(self, key: tuple[str, str], n: int) -> None:
         with self._lock:
-            self._counts[name, value] += n
-            if name in LOSSES:
-                self._recent.setdefault((name, value), Recent()).note(n, time.monotonic())
+            self._counts[key] += n
+            if key[0] in LOSSES:
+                self._recent.setdefault(key, Recent()).note(n, time.monotonic())
 
     def declare(self, name: str, *values: str) -> None:
         """Let the label of the counter `name` take these values too."""

@@ -1,10 +1,12 @@
 """The control client on a real server, with and without keys, and on servers that do not answer."""
 
+import json
 import socket
 import sys
 
 import pytest
 import zmq
+from languages import run
 from live_server import serving
 from manipnet_client import ControlClient, RequestError
 
@@ -136,3 +138,34 @@ def test_requests_as_methods(control):
     assert control.select_object("Box", shape, 0.9)["scale"] == 0.9
     with pytest.raises(RequestError, match="object"):
         control.select_object("Box", "nothing of this name")
+
+
+def test_csharp_control_client_does_the_same(server, harness):
+    """The client of the Unity package, on a real server."""
+    requests = [
+        ["hello"],
+        ["select_object", "body", "Box", "object", "mug", "scale", "1.25"],
+        ["look_ahead", "seconds", "0.3"],
+        ["pause", "on", "true"],
+        ["pause", "on", "false"],
+        ["mesh", "body", "Box"],
+        ["dance"],
+        ["select_object", "body", "Box", "object", 300 * "x"],
+    ]
+    lines = run(harness("csharp"), "control", server.addresses["control"], text=_tabbed(requests))
+    hello, selected, ahead, paused, running, mesh, *refused = lines
+    assert json.loads(hello)["version"] == __version__
+    assert json.loads(selected)["scale"] == 1.25
+    assert json.loads(ahead) == {"seconds": 0.3}
+    assert [json.loads(line)["paused"] for line in (paused, running)] == [True, False]
+    assert len(json.loads(mesh)["vertices"]) > 256
+    assert all(line.startswith("RequestException") and "allowed" in line for line in refused), refused
+
+
+def test_csharp_control_client_says_that_nobody_answers(harness):
+    (line,) = run(harness("csharp"), "control", "tcp://127.0.0.1:1", text="hello\n")
+    assert line == "IOException no server answers at 127.0.0.1:1"
+
+
+def _tabbed(requests):
+    return "".join("\t".join(words) + "\n" for words in requests)

@@ -50,6 +50,26 @@ def test_the_rate_of_each_body_is_known(senders, rate_hz, seconds):
     assert first["tracked"] == pytest.approx(0.5, abs=0.5 / rate_hz + 0.1)
 
 
+def test_what_arrives_in_one_burst_at_first_tells_no_rate(senders):
+    body = BodySample(1, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True)
+    waited = [BodyFrame(n / 100 - 2.0, n, (body,), 2e-5 * n, "zmq:a") for n in range(200)]
+    fresh = [BodyFrame(n / 100, n, (body,), n / 100, "zmq:a") for n in range(1, 350)]
+    for frame in waited:
+        senders(frame)
+    (reported,) = senders.report(0.01).values()
+    assert reported["frames"] == 200
+    assert reported["rate_hz"] == reported["bodies"][0]["rate_hz"] == 0.0
+    assert reported["bodies"][0]["tracked"] == 1.0
+    for frame in fresh:
+        senders(frame)
+        (reported,) = senders.report(frame.t_received_s).values()
+        for rate_hz in (reported["rate_hz"], reported["bodies"][0]["rate_hz"]):
+            assert rate_hz == 0.0 or rate_hz == pytest.approx(100.0)
+        assert reported["clock_speed"] is None or reported["clock_speed"] == pytest.approx(1.0)
+        assert reported["bodies"][0]["tracked"] == pytest.approx(1.0)
+    assert reported["rate_hz"] == reported["bodies"][0]["rate_hz"] == pytest.approx(100.0)
+
+
 def test_the_fastest_frame_gives_the_clock_offset(senders):
     for frame in frames(120, 5.0, way_s=0.05):
         senders(frame)

@@ -1,6 +1,7 @@
 """Bodies over ZeroMQ, through real sockets on free loopback ports."""
 
 import json
+import socket
 import threading
 
 import msgpack
@@ -132,20 +133,20 @@ def test_other_spellings_of_loopback(heard, telemetry, context, host):
 def trackers(context):
     """Two trackers that bind their PUB sockets, and their addresses."""
     sockets = [context.socket(zmq.XPUB) for _ in range(2)]
-    for socket in sockets:
-        socket.setsockopt(zmq.LINGER, 0)
-    yield [(socket, ("127.0.0.1", socket.bind_to_random_port("tcp://127.0.0.1"))) for socket in sockets]
-    for socket in sockets:
-        socket.close()
+    for each in sockets:
+        each.setsockopt(zmq.LINGER, 0)
+    yield [(each, ("127.0.0.1", each.bind_to_random_port("tcp://127.0.0.1"))) for each in sockets]
+    for each in sockets:
+        each.close()
 
 
 def test_trackers_that_bind_are_connected_to(heard, telemetry, trackers, context):
     receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0, trackers=tuple(address for _, address in trackers))
     receiver.start()
-    for n, (socket, _) in enumerate(trackers):
-        assert socket.poll(20_000)
-        socket.recv()
-        socket.send(msgpack.packb(message(n)))
+    for n, (tracker, _) in enumerate(trackers):
+        assert tracker.poll(20_000)
+        tracker.recv()
+        tracker.send(msgpack.packb(message(n)))
         assert heard.next().frame == n
     with sender(context, receiver.address) as publisher:  # and others may still connect
         publisher.send(msgpack.packb(message(9)))
@@ -156,22 +157,23 @@ def test_trackers_that_bind_are_connected_to(heard, telemetry, trackers, context
     receiver.stop()
 
 
-def bind_when_free(socket, port):
+def bind_when_free(tracker, port):
     """Bind to a port whose former socket may still be closing."""
     for _ in range(2_000):
         try:
-            return socket.bind(f"tcp://127.0.0.1:{port}")
+            return tracker.bind(f"tcp://127.0.0.1:{port}")
         except zmq.ZMQError:
             threading.Event().wait(0.01)
     raise AssertionError("the port stays in use")
 
 
 def test_a_tracker_that_starts_late_and_restarts_is_found(heard, telemetry, context):
-    with context.socket(zmq.XPUB) as probe:
-        port = probe.bind_to_random_port("tcp://127.0.0.1")
-    receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0, trackers=(("127.0.0.1", port),))
-    receiver.start()
-    assert receiver.status()["trackers"] == {f"tcp://127.0.0.1:{port}": False}
+    with socket.socket() as reserved:  # the receiver's own port must be another one
+        reserved.bind(("127.0.0.1", 0))
+        port = reserved.getsockname()[1]
+        receiver = ZmqBodies(ZEROMQ.intake(heard, telemetry), port=0, trackers=(("127.0.0.1", port),))
+        receiver.start()
+        assert receiver.status()["trackers"] == {f"tcp://127.0.0.1:{port}": False}
     for n in range(2):
         with context.socket(zmq.XPUB) as tracker:
             tracker.setsockopt(zmq.LINGER, 0)

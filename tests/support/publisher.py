@@ -3,6 +3,7 @@
 import argparse
 import itertools
 import time
+from dataclasses import replace
 
 import numpy as np
 import zmq
@@ -50,6 +51,7 @@ def main() -> None:
     parser.add_argument("--session", default="s")
     parser.add_argument("--token", help="the token that the WebSocket asks for")
     parser.add_argument("--rate", type=float, default=RATE_HZ)
+    parser.add_argument("--timecode", help="send this timecode, at 29.97 frames per second", metavar="HH:MM:SS:FF")
     parser.add_argument(
         "--skip", type=int, default=0, help="leave out every N-th frame, as a lossy network does", metavar="N"
     )
@@ -70,6 +72,8 @@ def main() -> None:
         if options.skip and seq % options.skip == 0:
             continue
         out = message(seq, seq / RATE_HZ, np.sin(seq / RATE_HZ), options.session)
+        if options.timecode:
+            out = replace(out, timecode=options.timecode, timecode_rate=29.97)
         payload = encode_binary(out)
         socket.send(TOPIC_BIN + payload)
         websocket.publish(payload)

@@ -8,6 +8,7 @@ from manipnet_client.retarget import BONES
 
 from manipnet.geometry import Side, matrix_to_quat, mirror_quats, quat_conjugate, quat_multiply
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import HandsMessage
 
@@ -28,5 +29,6 @@ def posed(side: Side, rng: np.random.Generator) -> tuple[HandsMessage, np.ndarra
     if side == "left":
         local, along = mirror_quats(local), along * [-1, 1, 1]
     live = messages()["live"]
-    hand = replace(live.hands[side], rotations=local)
+    _, joints = pose_in_world(HAND, [side], angles[None], live.hands[side].wrist[None], 1.0)
+    hand = replace(live.hands[side], rotations=local, joints=joints[0])
     return replace(live, hands={side: hand}), along / np.linalg.norm(along, axis=1, keepdims=True)

@@ -82,6 +82,7 @@ VERBS = {
             "takes/mug1 --format csv --out mug1.csv                     captured fingers as a table",
         ),
     ),
+    "hand": Verb("make, draw and check the profile of an avatar's hand", "manipnet_tools.hands.command"),
     "evaluate": Verb(
         "compare models with captured takes",
         "manipnet_tools.evaluation.command",

@@ -48,6 +48,8 @@ class Stats:
 class Client:
     """Receives the hands of one actor (the first seen, if None) from `tcp://HOST:PORT`.
 
+    With `hand`, they are those of the avatar whose profile has this name; `ControlClient.upload_hand` uploads one.
+
     `delay_s` is how far behind the newest frame `sample` shows the hands. `keys` names the file that
     `manipnet keys make NAME` wrote, for a server that requires keys; it needs pyzmq. The client is a context manager;
     otherwise call `close`. Any thread may call the methods. Raises `ValueError` for a wrong address or a wrong file of
@@ -55,9 +57,15 @@ class Client:
     """
 
     def __init__(
-        self, address: str, actor: str | None = None, delay_s: float = 0.1, keys: str | PathLike[str] | None = None
+        self,
+        address: str,
+        actor: str | None = None,
+        delay_s: float = 0.1,
+        keys: str | PathLike[str] | None = None,
+        hand: str | None = None,
     ) -> None:
-        self._open = _opener(address, keys)
+        self._topic = layout.TOPIC if hand is None else f"hand/{hand}/bin ".encode()
+        self._open = _opener(address, self._topic, keys)
         self._actor = actor
         self._changed = threading.Condition()
         self._interpolator = Interpolator(delay_s)
@@ -136,10 +144,10 @@ class Client:
             subscription.close()
 
     def _take(self, frame: bytes, arrival_s: float) -> None:
-        if not frame.startswith(layout.TOPIC):
+        if not frame.startswith(self._topic):
             return
         try:
-            hands = decode(frame[len(layout.TOPIC) :])
+            hands = decode(frame[len(self._topic) :])
         except MessageError as error:
             self._set(state=f"message refused: {error}", refused=self._stats.refused + 1)
             return
@@ -165,9 +173,11 @@ class Client:
             self._stats = replace(self._stats, **changes)  # type: ignore[arg-type]
 
 
-def _opener(address: str, keys: str | PathLike[str] | None) -> Callable[[], Subscription | SecureSubscription]:
+def _opener(
+    address: str, topic: bytes, keys: str | PathLike[str] | None
+) -> Callable[[], Subscription | SecureSubscription]:
     """A function that makes a connection; raises `ValueError` for a wrong address or a wrong file of keys."""
-    where = (*parse_address(address), layout.TOPIC, layout.MAX_PAYLOAD_BYTES)
+    where = (*parse_address(address), topic, layout.MAX_PAYLOAD_BYTES)
     if keys is None:
         return partial(Subscription, *where)
     from .curve import SecureSubscription, read_keys  # pyzmq is needed only with keys

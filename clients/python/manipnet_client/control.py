@@ -72,6 +72,15 @@ class ControlClient:
         """End the recording; returns its name, its seconds and what is in it. Raises as `ask`."""
         return self.ask("stop_recording")
 
+    def upload_hand(self, profile: dict[str, Any], actor: str | None = None) -> str:
+        """Upload the hands of an avatar and return the name to pass to `Client` as `hand`.
+
+        `profile` is a hand profile as docs/any-hand.md describes it, for example a file of `manipnet hand import`. The
+        server forgets it when nobody has subscribed to it for a minute. Raises what `ask` raises.
+        """
+        more = {} if actor is None else {"actor": actor}
+        return str(self.ask("hand_profile", profile=profile, **more)["name"])
+
     def _send(self, body: bytes) -> bytes:
         if self._keys is None:
             return zmtp.request(self._host, self._port, body, MAX_REPLY_BYTES, self._timeout_s)

@@ -5,10 +5,13 @@ All axes are right-handed, as in the messages and in Blender; quaternions are xy
 
 from __future__ import annotations
 
+import unicodedata
+
 import numpy as np
 
 from .layout import ZERO_POSITIONS, ZERO_ROTATIONS
 from .message import Hand
+from .rig_names import FINGER_BONES, HAND_BONES, THUMB_METACARPALS
 
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
 PARTS = ("Proximal", "Intermediate", "Distal")
@@ -70,57 +73,28 @@ def matches(bone: str, side: str, finger: int, part: int, thumb_metacarpal: bool
     It knows the names that are listed in `clients/README.md`. Rigs of VRM 1 and Godot have a `thumb_metacarpal`
     (`is_thumb_metacarpal`), and call the second bone of the thumb proximal.
     """
-    name, letter, number = _plain(bone), side[0], part + 1
+    name, letter = _plain(bone), side[0]
     if finger == 0 and bone[:-3] == "Thumb" and bone[-2:] in ("_L", "_R"):  # VRChat counts the thumb from zero
         return bone[-1].lower() == letter and bone[-3] == str(part)
     if is_thumb_metacarpal(bone, side):
         return (finger, part) == (0, 0)
     if finger == 0 and thumb_metacarpal and part < 2:
-        return part == 1 and name in _by_part(side, "thumb", PARTS[0])
-    words = _WORDS.get(finger, (FINGERS[finger].lower(),))
-    if any(name in _by_part(side, word, PARTS[part]) for word in words):
-        return True
-    if name == f"bip01{letter}finger{finger}{part or ''}" or name == f"finger{finger + 1}{number}{letter}":
-        return True
-    return any(name == pattern % word for pattern in _patterns(side, number) for word in words)
+        return part == 1 and name in (f"{side}thumbproximal", f"thumbproximal{letter}")
+    return name in FINGER_BONES[side][len(PARTS) * finger + part].split()
 
 
 def is_thumb_metacarpal(bone: str, side: str) -> bool:
     """Whether the name `bone` means the first bone of a thumb, as in VRM 1 and Godot."""
-    return _plain(bone) == f"{side}thumbmetacarpal"
+    return _plain(bone) in THUMB_METACARPALS[side][0].split()
 
 
 def is_hand(bone: str, side: str) -> bool:
     """Whether the name `bone` of a rig means the hand itself."""
-    letter = side[0]
-    return _plain(bone) in (
-        *(f"{side}hand", f"mixamorig{side}hand", f"{side}wrist", f"wrist{letter}", f"chandfk{letter}"),
-        *(f"{start}hand{letter}" for start in ("", "def")),
-        *(f"{start}{letter}hand" for start in ("", "jbip", "ccbase", "bip01")),
-    )
-
-
-_WORDS = {2: ("middle", "mid"), 4: ("little", "pinky")}
-
-
-def _by_part(side: str, word: str, part: str) -> tuple[str, str]:
-    return f"{side}{word}{part}".lower(), f"{word}{part}{side[0]}".lower()
-
-
-def _patterns(side: str, number: int) -> tuple[str, ...]:
-    """Names that count the bones of a finger, with a place for the word of the finger."""
-    letter = side[0]
-    return (
-        *(f"{start}{side}hand%s{number}" for start in ("", "mixamorig")),
-        *(f"{start}%s0{number}{letter}" for start in ("", "f", "def", "deff")),
-        *(f"{start}{letter}%s{number}" for start in ("", "jbip", "ccbase")),
-        *(f"{start}%s{number}{letter}" for start in ("", "c")),
-        *(f"{side}%s{number}", f"%sfinger{number}{letter}"),
-    )
+    return _plain(bone) in HAND_BONES[side][0].split()
 
 
 def _plain(name: str) -> str:
-    return "".join(c for c in name.rpartition(":")[2] if c.isalnum()).lower()
+    return "".join(c for c in unicodedata.normalize("NFKC", name.rpartition(":")[2]) if c.isalnum()).lower()
 
 
 def multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:

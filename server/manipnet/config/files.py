@@ -11,6 +11,7 @@ def check_files(config: ServerConfig) -> None:
     """Raise `ConfigError` unless the meshes can be opened, and `BundleError` unless the model exists."""
     find_bundle(config.model)
     for actor in config.actors:
+        require_file(actor.hand)
         for prop in actor.objects:
             require_file(prop.mesh)
 

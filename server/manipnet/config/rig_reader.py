@@ -25,7 +25,7 @@ DEFAULT_ACTOR_TOML = "[bodies]\nleft_wrist = 'left_wrist'\nright_wrist = 'right_
 """The rig of a server that is given none."""
 
 _KINDS = {str: "text", int: "an integer", float: "a number", bool: "true or false"}
-_ACTOR_KEYS = ("bodies", "objects", "hand_scale", "limits_deg")
+_ACTOR_KEYS = ("bodies", "objects", "hand_scale", "limits_deg", "hand")
 _OFFSET_KEYS = ("body", "position", "rotation")
 
 
@@ -113,7 +113,14 @@ class _Reader:
         hand_scale = self._number(table.get("hand_scale", 1.0), (*at, "hand_scale"))
         if not SCALE_RANGE[0] <= hand_scale <= SCALE_RANGE[1]:
             self._fail((*at, "hand_scale"), f"is {hand_scale}; allowed are {SCALE_RANGE[0]} … {SCALE_RANGE[1]}")
-        return ActorConfig(name, wrists, objects, hand_scale, self._limits(table.get("limits_deg", {}), at))
+        limits = self._limits(table.get("limits_deg", {}), at)
+        return ActorConfig(name, wrists, objects, hand_scale, limits, self._hand(table.get("hand"), (*at, "hand")))
+
+    def _hand(self, value: Any, at: Place) -> Path | None:
+        if value is None:
+            return None
+        text = self._typed(value, (str,), at, "the file of a hand profile")
+        return self._folder / text if text and len(text) <= 4096 else self._fail(at, "is empty or too long for a file")
 
     def _limits(self, value: Any, at: Place) -> dict[str, tuple[float, float]]:
         at = (*at, "limits_deg")

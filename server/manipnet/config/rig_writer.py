@@ -118,6 +118,8 @@ def _check(text: str, path: Path, actor: ActorConfig) -> None:
 def _actor(actor: ActorConfig) -> dict[str, Any]:
     table: dict[str, Any] = {"hand_scale": actor.hand_scale} if actor.hand_scale != 1.0 else {}
     table["bodies"] = {wrist: _body(body) for wrist, body in actor.wrists.items()}
+    if actor.hand is not None:
+        table["hand"] = str(actor.hand.resolve())
     if actor.limits:
         ends = {name: [_degrees(low), _degrees(high)] for name, (low, high) in actor.limits.items()}
         table["limits_deg"] = ends

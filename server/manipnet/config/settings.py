@@ -80,6 +80,9 @@ class ActorConfig:
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Lower and upper limit, in radians, of some of `wire.hand_names.ANGLE_NAMES`; they narrow the model's limits."""
 
+    hand: Path | None = None
+    """The profile of an avatar's hand, on which the actor is solved too."""
+
     def bodies(self) -> dict[str, BodyConfig]:
         """The body of each wrist and prop, by the name of the wrist or prop."""
         return {**self.wrists, **{prop.name: prop.body for prop in self.objects}}

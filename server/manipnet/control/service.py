@@ -16,7 +16,8 @@ from manipnet.net.supervised import ReceiverHealth, SupervisedThread
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.telemetry import Telemetry
 
-MAX_REQUEST_BYTES: Final = 4096
+MAX_REQUEST_BYTES: Final = 65_536
+"""A hand profile as JSON with all its digits has 10 000."""
 REQUESTS_PER_S: Final = 200
 BURST: Final = 50
 """Totals over all clients; above them, replies are delayed to protect tick time."""

@@ -23,10 +23,11 @@ class Intake:
         telemetry.declare("frames_in", protocol)
         telemetry.declare("sender_restarts", protocol)
         telemetry.declare("frames_dropped", *drop_reasons)
+        self._count_frame = telemetry.counter("frames_in", source=protocol)
 
     def accept(self, frame: BodyFrame) -> None:
         """Count a frame and pass it on. A fault of the sink is logged and counted; it does not end the receiver."""
-        self.telemetry.count("frames_in", source=self.protocol)
+        self._count_frame()
         try:
             self._sink(frame)
         except Exception:

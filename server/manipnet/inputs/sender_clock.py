@@ -40,8 +40,9 @@ _STILL: Final = "stands still"
 class Clock:
     """One way in which a sender states times. `runs` is None until that is known."""
 
-    def __init__(self, name: str, plausible: tuple[float, float]) -> None:
-        self.name = name
+    def __init__(self, name: str, place: int, plausible: tuple[float, float]) -> None:
+        """`place` is its place among the clocks of its sender."""
+        self.name, self.place = name, place
         self.runs: bool | None = None
         self.doubtful = False
         """Whether the first value does not look like a time of a running clock."""
@@ -128,7 +129,7 @@ class SenderClock:
     """The clocks of one sender, best first, and which of them its frames go by."""
 
     def __init__(self, names: Iterable[str], plausible: tuple[float, float] = PLAUSIBLE) -> None:
-        self.clocks = tuple(Clock(name, plausible) for name in names)
+        self.clocks = tuple(Clock(name, i, plausible) for i, name in enumerate(names))
         self._used: Clock | None = None
         self._has_forgotten = False
         """Whether it matters how many frames in a row state a clock."""
@@ -166,9 +167,7 @@ class SenderClock:
         used = self._used
         if used is None or used.runs is False:
             used = self._used = self._best(stated_s)
-        if used is None:
-            return self._arrival_s(now_s, repeats)
-        return stated_s[self.clocks.index(used)]
+        return self._arrival_s(now_s, repeats) if used is None else stated_s[used.place]
 
     def _best(self, stated_s: tuple[float | None, ...]) -> Clock | None:
         stated = [clock for clock, t_s in zip(self.clocks, stated_s, strict=True) if t_s is not None]

@@ -13,12 +13,15 @@ class TimecodeRate:
 
     def __init__(self) -> None:
         self.rate: float | None = None
-        self._second = ""
+        self._timecode = self._second = ""
         self._first = self._highest = 0
         self._counted = 0
 
     def note(self, timecode: str) -> float | None:
         """Take the timecode HH:MM:SS:FF of a frame; returns the rate as far as it is known."""
+        if timecode == self._timecode:  # most frames share it with the one before
+            return self.rate
+        self._timecode = timecode
         second, frame = timecode[:8], int(timecode[9:])
         if second != self._second:
             count = self._highest + 1 if self._first <= 1 else 0  # some kinds of counting drop the first numbers

@@ -14,9 +14,13 @@ def to_unity(poses: Array) -> Array:
 
 
 def to_unreal(poses: Array) -> Array:
-    """Convert poses `(..., 7)` to left-handed, Z up, X forward (our -z), centimetres."""
+    """Convert poses `(..., 7)` to left-handed, Z up, centimetres.
+
+    The position (x, y, z) becomes (z, -x, y), as in OptiTrack's Live Link plugin, so that its bodies and our hands
+    share one level.
+    """
     x, y, z, qx, qy, qz, qw = np.moveaxis(poses, -1, 0)
-    return np.stack([-100.0 * z, 100.0 * x, 100.0 * y, qz, -qx, -qy, qw], axis=-1)
+    return np.stack([100.0 * z, -100.0 * x, 100.0 * y, -qz, qx, -qy, qw], axis=-1)
 
 
 def to_blender(poses: Array) -> Array:

@@ -49,6 +49,13 @@ class HandsOutput:
         """Send one message and return at once; False if it went to nobody. Raises `OSError` if it cannot be sent."""
         raise NotImplementedError
 
+    def wants(self, avatar: str) -> bool:
+        """Whether a client has subscribed to the hands of an avatar, by the name of its profile."""
+        return False
+
+    def send_avatar(self, hands: EncodedHands) -> None:
+        """Send the hands of an avatar to the clients that want them. Raises `OSError` if they cannot be sent."""
+
     def close(self) -> None:
         """Close the sockets. Does nothing the second time."""
         raise NotImplementedError

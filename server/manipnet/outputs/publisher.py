@@ -47,6 +47,20 @@ class Publisher:
             except OSError as error:
                 _log.warning("%s: hands cannot be sent: %s", declared.name, error)
 
+    def wants(self, avatar: str) -> bool:
+        """Whether anybody has subscribed to the hands of an avatar, by the name of its profile."""
+        return any(output.wants(avatar) for output in self._outputs.values())
+
+    def publish_avatar(self, message: HandsMessage) -> None:
+        """Send the hands of an avatar, which `message.hand` names. Raises `MessageError` as `publish` does."""
+        binary = encode_binary(message)
+        hands = EncodedHands(message, encode_msgpack(message, checked=True), binary)
+        for declared, output in self._outputs.items():
+            try:
+                output.send_avatar(hands)
+            except OSError as error:
+                _log.warning("%s: an avatar's hands cannot be sent: %s", declared.name, error)
+
     def close(self) -> None:
         """Close every output. Does nothing the second time."""
         while self._outputs:

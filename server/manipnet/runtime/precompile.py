@@ -19,6 +19,7 @@ def compile_aside() -> None:
     """Compile all kernels of a start and of a tick except the solver's, by using each of them."""
     import numpy as np
 
+    from manipnet.runtime.warm_up import carry_a_hand
     from manipnet.synthesis.hand.kinematics import forward_kinematics
     from manipnet.synthesis.hand.limits import keep_angles
     from manipnet.synthesis.hand.openxr import pose_in_world
@@ -44,6 +45,7 @@ def compile_aside() -> None:
     sample([track], np.linspace(-0.5, 0.5, 21), 0.0, 0.1, damped_velocity, smoothing)
     keep_angles(angles, hand.limits.copy(), angles, 1.0, np.empty_like(angles))
     pose_in_world(hand, ["right"], angles[None], still[:1], 1.0)
+    carry_a_hand(hand, scene.shape)
 
 
 class Precompiler:

@@ -12,6 +12,7 @@ from typing import Final, Protocol
 from manipnet.actors.actor import Actor
 from manipnet.actors.plan import Plan, synthesise
 from manipnet.actors.transitions import ShownHand
+from manipnet.runtime.avatars import Avatars
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.frame_intake import FrameIntake
 from manipnet.runtime.mailbox import Mailbox
@@ -49,9 +50,10 @@ class TickLoop:
         recorder: FlightRecorder,
         telemetry: Telemetry,
         observer: TickObserver | None = None,
+        avatars: Avatars | None = None,
     ) -> None:
         self._actors, self._synthesizer, self._mailbox = actors, synthesizer, mailbox
-        self._telemetry, self._observer = telemetry, observer
+        self._telemetry, self._observer, self._avatars = telemetry, observer, avatars
         self._errors = TickErrors(actors, recorder, telemetry)
         self._intake = FrameIntake(actors, recorder, self._errors, telemetry)
         self._publisher = TickPublisher(session, publish, self._errors, telemetry)
@@ -67,6 +69,8 @@ class TickLoop:
                 self.take_in(0.0)
             if time.monotonic() >= next_second_s:
                 next_second_s += 1.0
+                if self._avatars is not None:
+                    self._avatars.forget_unwanted()
                 try:
                     every_second(time.monotonic())
                 except Exception:
@@ -85,7 +89,10 @@ class TickLoop:
         plans = [(actor, self._plan(actor, tick)) for actor in self._actors if (tick := actor.poll(now_s)) is not None]
         self._synthesise([plan for _, plan in plans])
         for actor, plan in plans:
-            message = self._publisher.send(actor, plan.tick, self._show(actor, plan))
+            hands = self._show(actor, plan)
+            message = self._publisher.send(actor, plan.tick, hands)
+            if message is not None and self._avatars is not None:
+                self._avatars.show(actor, plan.tick, hands, message)
             if message is not None and self._observer is not None and self._observer.watched:
                 try:
                     self._observer.see(actor, plan, message)

@@ -14,6 +14,9 @@ from manipnet.config.settings import default_actor
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
+from manipnet.synthesis.carrying import HandCarrier
+from manipnet.synthesis.hand.avatar import avatar_hand, model_profile
+from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.ik.pose import allocate_poses, pose_kernel
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle
@@ -65,6 +68,13 @@ def pose_a_hand(bundle: Bundle, solver: str = DEFAULT_SOLVER) -> None:
     poses.correction[:] = 0.0
     network = outputs, before, bundle.response, bundle.limits
     pose_kernel(solver)(hand.packed, layout.output_starts, shape.solid, windows, *network, 0, 1, poses)
+
+
+def carry_a_hand(hand: Hand, shape: Shape) -> None:
+    """Solve the model's own hand as if it were an avatar's, which compiles what an avatar needs."""
+    still = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    carrier = HandCarrier(avatar_hand(model_profile(hand, "left"), "left", hand), hand, "left")
+    carrier.step(np.zeros(hand.angle_count), still, (shape, still, 1.0))
 
 
 def _frame(t_s: float, now_s: float) -> BodyFrame:

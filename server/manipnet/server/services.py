@@ -41,6 +41,7 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     outputs = open_outputs(config.of, Emission(telemetry, session.bundle.hand, config.host, keys))
     publisher = Publisher(outputs, telemetry, recorder.note)
     opened.callback(publisher.close)
+    session.avatars.audience = publisher
     meshes = MeshWatch(session.catalog, session.replace_shape)
     opened.callback(meshes.stop)
     meshes.start()

@@ -9,20 +9,24 @@ from platformdirs import user_log_path
 
 from manipnet import __version__
 from manipnet.actors.actor import Actor
+from manipnet.actors.avatar import Avatar
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, ServerConfig
 from manipnet.control.actors_proxy import ActorsProxy
 from manipnet.control.calibration_requests import CalibrationRequests
+from manipnet.control.hand_requests import HandRequests
 from manipnet.control.peers import Peers
 from manipnet.control.request import Handler, Request
 from manipnet.control.session_requests import SessionRequests
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.recording.recorder import carried_objects
+from manipnet.runtime.avatars import avatars_of
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.tick_loop import TickLoop, TickObserver
-from manipnet.runtime.warm_up import pose_a_hand, warm_up
+from manipnet.runtime.warm_up import carry_a_hand, pose_a_hand, warm_up
+from manipnet.synthesis.hand.profile import profile_to_json, read_profile
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import Synthesizer
@@ -37,7 +41,10 @@ class Session:
     """Loads what is configured, and makes the parts of a server that need it."""
 
     def __init__(self, config: ServerConfig, wait_for_kernels: Callable[[], object]) -> None:
-        """Raises `BundleError` and `MeshError`. `wait_for_kernels` is called before the first kernel of sensing."""
+        """Raises `BundleError`, `MeshError` and `ProfileError`.
+
+        `wait_for_kernels` is called before the first kernel of sensing.
+        """
         self.config = config
         self.id = secrets.token_hex(8)
         self.telemetry = Telemetry()
@@ -46,6 +53,9 @@ class Session:
         pose_a_hand(self.bundle, config.solver)
         wait_for_kernels()
         self.actors = [self._load_actor(actor) for actor in config.actors]
+        profiles = {actor.name: read_profile(actor.hand) for actor in config.actors if actor.hand is not None}
+        avatars = {actor: Avatar(profile, self.bundle.hand) for actor, profile in profiles.items()}
+        self.avatars = avatars_of(self.actors, avatars, self.telemetry)
         self._mailbox = Mailbox(self.telemetry)
         self._proxy = ActorsProxy(self.actors, self._mailbox)
         self.senders = SenderStats(self._mailbox.put)
@@ -57,6 +67,7 @@ class Session:
         """Run every shape through a tick loop once."""
         shapes = self.catalog.shapes() or [self.catalog.shape(WARM_UP_OBJECT)]
         warm_up(self.bundle, shapes, self.config.solver)
+        carry_a_hand(self.bundle.hand, shapes[0])
 
     def tick_loop(self, publish: Callable[[HandsMessage], object], observer: TickObserver) -> TickLoop:
         """The loop from the mailbox to `publish`."""
@@ -69,6 +80,7 @@ class Session:
             FlightRecorder(self.config.dump_dir or user_log_path("manipnet", appauthor=False)),
             self.telemetry,
             observer,
+            self.avatars,
         )
 
     def handlers(self) -> dict[str, Handler]:
@@ -76,13 +88,14 @@ class Session:
         requests = SessionRequests(
             self.id, self.bundle, self.config.solver, self._proxy, self.catalog, self.telemetry
         ).handlers()
+        hands = HandRequests(self._proxy, self.avatars, self.bundle.hand).handlers()
         calibration = CalibrationRequests(self._proxy, self.config.rig).handlers()
         own = requests["status"]
 
         def status(request: Request) -> dict[str, Any]:
             return {**own(request), "exposed": self.config.is_exposed}
 
-        return {**requests, **calibration, **self.peers.handlers(status)}
+        return {**requests, **hands, **calibration, **self.peers.handlers(status)}
 
     def replace_shape(self, old: Shape, new: Shape) -> None:
         """Replace a shape in every prop between two ticks. From any thread; raises `RequestError`."""
@@ -91,12 +104,14 @@ class Session:
     def recording_context(self) -> tuple[dict[str, str], list[Prop]]:
         """What a recording depends on: its metadata, and the props whose meshes it keeps. Raises `RequestError`."""
         props = self._proxy.ask(lambda: [prop for actor in self.actors for prop in actor.props])
+        profiles = self._proxy.ask(self.avatars.profiles)
         metadata = {
             "session": self.id,
             "version": __version__,
             "model": self.bundle.name,
             "model_hash": self.bundle.model_hash,
             "objects": carried_objects(props),
+            **{f"hand {profile.name}": profile_to_json(profile) for profile in profiles},
         }
         if self.config.rig is not None:
             with suppress(OSError, UnicodeDecodeError):  # a rig file that is gone must not prevent a recording

@@ -15,6 +15,7 @@ from manipnet.wire.hands import (
     HandsMessage,
     Latency,
     State,
+    hand_topics,
 )
 from manipnet.wire.msgpack_codec import decode_msgpack, encode_msgpack
 from manipnet.wire.validation import check
@@ -36,4 +37,5 @@ __all__ = [
     "decode_msgpack",
     "encode_binary",
     "encode_msgpack",
+    "hand_topics",
 ]

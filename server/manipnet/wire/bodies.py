@@ -83,8 +83,9 @@ def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
         raise MessageError(f"bodies is {_kind(entries)}; it must be a list of maps")
     if len(entries) > MAX_BODIES:
         raise MessageError(f"bodies has {len(entries)} entries; at most {MAX_BODIES} are allowed")
-    bodies = tuple([_body(entry, f"bodies[{i}]") for i, entry in enumerate(entries)])
-    check_distinct(bodies)
+    bodies = tuple([_body(entry, i) for i, entry in enumerate(entries)])
+    if len(bodies) > 1:
+        check_distinct(bodies)
     timecode, rate = message.get("timecode"), message.get("timecode_rate")
     if timecode is not None and not is_timecode(timecode):
         raise MessageError(f"timecode is {_show(timecode)}; it must be HH:MM:SS:FF, or HH:MM:SS;FF for drop frame")
@@ -171,22 +172,23 @@ def _with_text(value: Any) -> Any:
     return value
 
 
-def _body(entry: object, where: str) -> BodySample:
+def _body(entry: object, i: int) -> BodySample:
+    """The body number `i` of a message."""
     if not isinstance(entry, dict):
-        raise MessageError(f"{where} is {_kind(entry)}; it must be a map with id or name, p and q")
+        raise MessageError(f"bodies[{i}] is {_kind(entry)}; it must be a map with id or name, p and q")
     id, name = entry.get("id"), entry.get("name") or None  # an empty name is what some languages write for none
     if id is None and name is None:
-        raise MessageError(f"{where} has neither id nor name; it must have at least one of them")
+        raise MessageError(f"bodies[{i}] has neither id nor name; it must have at least one of them")
     if id is not None and not _is_int(id, 31):
-        raise MessageError(f"{where}.id is {_show(id)}; it must be an integer of at most 31 bits")
+        raise MessageError(f"bodies[{i}].id is {_show(id)}; it must be an integer of at most 31 bits")
     if name is not None:
-        check_name(name, f"{where}.name")
+        check_name(name, f"bodies[{i}].name")
     tracked = entry.get("tracked")
     if tracked is None:
         tracked = True
     elif not isinstance(tracked, bool):
-        raise MessageError(f"{where}.tracked is {_show(tracked)}; it must be true or false")
-    return make_sample(id, name, _numbers(entry, "p", 3, where), _numbers(entry, "q", 4, where), tracked)
+        raise MessageError(f"bodies[{i}].tracked is {_show(tracked)}; it must be true or false")
+    return make_sample(id, name, _numbers(entry, "p", 3, i), _numbers(entry, "q", 4, i), tracked)
 
 
 def _fault(p: tuple[float, ...], q: tuple[float, ...]) -> str:
@@ -195,13 +197,13 @@ def _fault(p: tuple[float, ...], q: tuple[float, ...]) -> str:
     return "bounds" if max(map(abs, p)) > MAX_COORDINATE_M else "zero_quaternion"
 
 
-def _numbers(entry: Mapping[str, Any], key: str, count: int, where: str) -> tuple[float, ...]:
+def _numbers(entry: Mapping[str, Any], key: str, count: int, i: int) -> tuple[float, ...]:
     values = entry.get(key)
     if type(values) is not list or len(values) != count:
-        raise MessageError(f"{where}.{key} is {_show(values)}; it must be a list of {count} numbers")
+        raise MessageError(f"bodies[{i}].{key} is {_show(values)}; it must be a list of {count} numbers")
     if {*map(type, values)} == _FLOATS:
         return tuple(values)
-    return tuple(_float(value, f"{where}.{key}[{i}]") for i, value in enumerate(values))
+    return tuple([_float(value, f"bodies[{i}].{key}[{k}]") for k, value in enumerate(values)])
 
 
 def _number(entry: Mapping[str, Any], key: str, where: str) -> float:

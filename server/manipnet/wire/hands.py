@@ -18,6 +18,13 @@ VERSION: Final = 1
 MAGIC: Final = b"MNPL"
 TOPIC_MSGPACK: Final = b"pose/msgpack "
 TOPIC_BIN: Final = b"pose/bin "
+
+
+def hand_topics(name: str) -> tuple[bytes, bytes]:
+    """The topics of the hands of a profile, in msgpack and binary."""
+    return f"hand/{name}/msgpack ".encode(), f"hand/{name}/bin ".encode()
+
+
 MAX_PAYLOAD_BYTES: Final = 131_072
 NAME_BYTES: Final = 63
 """The longest name in the binary encoding, in bytes of UTF-8. Names in msgpack may have any length."""
@@ -48,6 +55,8 @@ class HandPose:
     rotations: Annotated[Array, np.dtype(("<f4", (len(BONE_NAMES), 4)))]
     wrist: Pose
     joints: Annotated[Array, np.dtype(("<f4", (len(OPENXR_JOINT_NAMES), 7)))]
+    wrist_shift: Array | None = None
+    """`(3,)` how far the wrist of an avatar's hand is moved from where it is tracked, in the world, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +101,8 @@ class HandsMessage:
     """SMPTE timecode HH:MM:SS:FF of the instant (";" before FF for drop frame), if the tracker sends one."""
     timecode_rate: float | None = None
     """The timecode's frames per second, if it is known."""
+    hand: str | None = None
+    """The name of the hand profile that the hands are of; None for the model's hand."""
 
 
 Record = list[tuple[str, np.dtype]]

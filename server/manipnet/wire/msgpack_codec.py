@@ -34,6 +34,7 @@ def encode_msgpack(message: HandsMessage, checked: bool = False) -> bytes:
             "latency_ms": {f.name: float(getattr(message.latency_ms, f.name)) for f in fields(Latency)},
             "timecode": message.timecode,
             "timecode_rate": None if message.timecode_rate is None else float(message.timecode_rate),
+            **({} if message.hand is None else {"hand": message.hand}),
         }
     )
     assert payload is not None  # only None when msgpack streams into a buffer
@@ -64,6 +65,7 @@ def decode_msgpack(payload: bytes) -> HandsMessage:
         latency_ms=Latency(*(_number(latency, f.name, "latency_ms.") for f in fields(Latency))),
         timecode=None if top.get("timecode") is None else _get(top, "timecode", str),
         timecode_rate=None if top.get("timecode_rate") is None else _number(top, "timecode_rate"),
+        hand=None if top.get("hand") is None else _get(top, "hand", str),
     )
     check(message)
     return message
@@ -78,6 +80,7 @@ def _hand_map(hand: HandPose) -> dict[str, Any]:
         "rotations": hand.rotations.tolist(),
         "wrist": {"p": hand.wrist[:3].tolist(), "q": hand.wrist[3:].tolist()},
         "joints": hand.joints.tolist(),
+        **({} if hand.wrist_shift is None else {"wrist_shift": hand.wrist_shift.tolist()}),
     }
 
 
@@ -97,6 +100,7 @@ def _hand_value(value: Any, where: str) -> HandPose:
         rotations=_array(hand.get("rotations"), (17, 4), f"{where}.rotations"),
         wrist=_pose_value(_get(hand, "wrist", dict, f"{where}."), f"{where}.wrist"),
         joints=_array(hand.get("joints"), (26, 7), f"{where}.joints"),
+        wrist_shift=None if (shift := hand.get("wrist_shift")) is None else _array(shift, (3,), f"{where}.wrist_shift"),
     )
 
 

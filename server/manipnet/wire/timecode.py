@@ -1,12 +1,14 @@
 """SMPTE timecode as text: HH:MM:SS:FF, or HH:MM:SS;FF if the counting drops frame numbers."""
 
 import re
+from functools import lru_cache
 from typing import Final
 
 MAX_RATE: Final = 1_000.0
 _TEXT: Final = re.compile(r"(\d\d):([0-5]\d):([0-5]\d)[:;](\d\d)")
 
 
+@lru_cache(maxsize=4)
 def timecode_text(packed: int) -> str | None:
     """The timecode that NatNet packs into an integer: hours, minutes, seconds and frames in a byte each.
 

@@ -48,6 +48,8 @@ def _check_hand(hand: HandPose, where: str) -> None:
     for name, dtype in RECORDS[HandPose]:
         if dtype.shape:
             _check_floats(getattr(hand, name), dtype.shape, f"{where}.{name}")
+    if hand.wrist_shift is not None:
+        _check_floats(hand.wrist_shift, (3,), f"{where}.wrist_shift")
     _check_units(hand.rotations, f"{where}.rotations")
     _check_units(hand.joints[:, 3:], f"{where}.joints")
     _check_units(hand.wrist[3:], f"{where}.wrist.q")

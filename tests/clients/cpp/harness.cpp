@@ -15,12 +15,15 @@
 #include <utility>
 #include <vector>
 
+#include "ArmIk.h"
 #include "Axes.h"
+#include "BoneNames.h"
 #include "Client.h"
 #include "Decoder.h"
 #include "Interpolator.h"
 #include "LocalClock.h"
 #include "Skeleton.h"
+#include "Timecode.h"
 
 using namespace manipnet;
 
@@ -138,7 +141,7 @@ void DescribeSkeleton() {
     HandsFrame frame;
     if (!Decode(data.data(), data.size(), frame).empty()) std::abort();
     Skeleton::Poses poses;
-    Skeleton::LocalPoses(frame.Hand(Side::Left), poses);
+    Skeleton::LocalPoses(frame.Hand(Side::Left), Placement(), poses);
     for (std::size_t bone = 0; bone < Skeleton::kBones; ++bone) {
         const UnrealPose& p = poses[bone];
         std::cout << Skeleton::BoneName(bone) << " " << Skeleton::ParentOf(bone);
@@ -153,7 +156,76 @@ void Connections() {
         Connection to;
         const std::string error = ParseConnection(line, to);
         if (!error.empty()) std::cout << "error: " << error << "\n";
-        else std::cout << to.Host << " " << to.Port << " '" << to.Actor << "' " << to.DelayS << "\n";
+        else
+            std::cout << to.Host << " " << to.Port << " '" << to.Actor << "' " << to.DelayS << " | " << FormatConnection(to) << "\n";
+    }
+}
+
+std::string Describe(const std::string& text, double rate) {
+    Timecode t;
+    if (!ParseTimecode(text, rate, t)) return "none";
+    std::ostringstream out;
+    out << t.Hours << " " << t.Minutes << " " << t.Seconds << " " << t.Frames << " " << t.DropFrame << " " << t.Numerator << "/"
+        << t.Denominator;
+    return out.str();
+}
+
+/// Prints the timecode of a message, its rate and their meaning.
+void TimecodeOf(const char* path) {
+    std::ifstream file(path, std::ios::binary);
+    const std::vector<char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    const std::vector<std::uint8_t> data(bytes.begin(), bytes.end());
+    HandsFrame frame;
+    if (!Decode(data.data(), data.size(), frame).empty()) std::abort();
+    const double rate = static_cast<double>(frame.TimecodeRate);
+    std::cout << frame.TimecodeText.Text << " " << rate << " " << Describe(frame.TimecodeText.Text, rate) << "\n";
+}
+
+/// Prints the meaning of each line with a timecode and a rate.
+void Timecodes() {
+    std::string text;
+    double rate = 0.0;
+    while (std::cin >> text >> rate) std::cout << Describe(text, rate) << "\n";
+}
+
+/// Prints which bone each name means, as side, finger and part.
+void Names() {
+    for (std::string line; std::getline(std::cin, line);) {
+        std::string found = "none";
+        for (const Side side : {Side::Left, Side::Right}) {
+            const std::string word = side == Side::Left ? "Left " : "Right ";
+            if (IsHandName(line, side)) found = word + "hand";
+            for (std::size_t bone = 0; bone < kFingerBones; ++bone)
+                if (MatchesFinger(line, side, bone / 3, bone % 3, false))
+                    found = word + std::to_string(bone / 3) + " " + std::to_string(bone % 3);
+        }
+        std::cout << found << "\n";
+    }
+}
+
+/// Prints the meaning of each line as a bone map.
+void BoneMaps() {
+    for (std::string line; std::getline(std::cin, line);) {
+        BoneMap map;
+        const std::string error = ParseBoneMap(line, map);
+        if (!error.empty()) std::cout << "error: " << error << "\n";
+        else {
+            for (const auto& [name, bone] : map) std::cout << name << "=" << bone << ";";
+            std::cout << "\n";
+        }
+    }
+}
+
+/// Reads shoulder, elbow, wrist and target; prints where elbow and wrist arrive.
+void Arms() {
+    Vec shoulder, elbow, wrist, target;
+    const auto read = [](Vec& v) { return static_cast<bool>(std::cin >> v.X >> v.Y >> v.Z); };
+    while (read(shoulder) && read(elbow) && read(wrist) && read(target)) {
+        const ArmTurn turn = SolveArm(shoulder, elbow, wrist, target);
+        const Vec newElbow = shoulder + Rotate(turn.Upper, elbow - shoulder);
+        const Vec newWrist = newElbow + Rotate(turn.Lower, wrist - elbow);
+        for (const Vec& v : {newElbow, newWrist}) std::cout << Number(v.X) << " " << Number(v.Y) << " " << Number(v.Z) << " ";
+        std::cout << "\n";
     }
 }
 
@@ -276,6 +348,16 @@ int main(int count, char** words) {
         DescribeSkeleton();
     } else if (verb == "connections") {
         Connections();
+    } else if (verb == "timecode") {
+        for (int i = 2; i < count; ++i) TimecodeOf(words[i]);
+    } else if (verb == "timecodes") {
+        Timecodes();
+    } else if (verb == "names") {
+        Names();
+    } else if (verb == "bone_maps") {
+        BoneMaps();
+    } else if (verb == "arms") {
+        Arms();
     } else if (verb == "live" && count == 3) {
         return Live(words[2]);
     } else if (verb == "idle" && count == 3) {

@@ -32,19 +32,19 @@ static class Glue
         var animator = scene.AddComponent<Animator>();
         Transform hand = Skeleton(animator, "");
         var fingers = scene.AddComponent<ManipNetHand>();
-        fingers.Configure(receiver, Side.Right, animator, null, true);
+        fingers.Configure(receiver, Side.Right, animator, null, WristMode.Arm);
         var joints = scene.AddComponent<ManipNetJoints>();
         joints.Configure(receiver, Side.Right, null);
         Transform named = Skeleton(null, "mixamorig:RightHand");
         var byName = scene.AddComponent<ManipNetHand>();
-        byName.Configure(receiver, Side.Right, null, named, true);
+        byName.Configure(receiver, Side.Right, null, named, WristMode.Arm);
         var xr = new GameObject("R_Wrist").transform;
         var own = new GameObject("R_IndexTip").transform;
         own.SetParent(xr, false);
         var xrHand = xr.gameObject.AddComponent<ManipNetJoints>();
         xrHand.Configure(receiver, Side.Right, null);
         var nameless = scene.AddComponent<ManipNetHand>();
-        nameless.Configure(receiver, Side.Left, null, scene.transform, false);
+        nameless.Configure(receiver, Side.Left, null, scene.transform, WristMode.Keep);
         Call(receiver, "OnEnable");
         Call(joints, "Start");
         Call(xrHand, "Start");
@@ -67,6 +67,7 @@ static class Glue
         Print("xr", Flat(own));
         Print("palm", Flat(xr.All().First(t => t.name == "Palm")));
         Console.WriteLine("made " + xr.All().Count());
+        Features.Run(receiver);
         Sample(args[0]);
         Window(args[0]);
         Call(receiver, "OnDisable");
@@ -116,6 +117,11 @@ static class Glue
         Skeleton(character.AddComponent<Animator>(), "");
         Selection.activeGameObject = character;
         Press(window, "Add hands to the selected character");
+        Press(window, "Add hands to the selected character");
+        Console.WriteLine("twice " + character.GetComponents<ManipNetHand>().Length + " " + character.GetComponents<ManipNetReceiver>().Length
+            + " " + Undo.Recorded.Contains(character.GetComponent<ManipNetReceiver>())
+            + " " + PrefabUtility.Recorded.Contains(character.GetComponent<ManipNetReceiver>())
+            + " " + PrefabUtility.Recorded.Contains(character.GetComponent<ManipNetHand>()));
         Press(window, "Stop test");
         Call(window, "OnDisable");
         int k = 0;
@@ -133,7 +139,7 @@ static class Glue
     /// Creates a hand whose bones lie along x, as the model's do, in Unity's axes: of a Humanoid, or with bones named
     /// after `names`.
     /// </summary>
-    static Transform Skeleton(Animator animator, string names)
+    public static Transform Skeleton(Animator animator, string names)
     {
         var hand = new GameObject(animator == null ? names : "RightHand").transform;
         if (animator != null) animator.Bones[HumanBodyBones.RightHand] = hand;
@@ -153,17 +159,17 @@ static class Glue
         return hand;
     }
 
-    static void Call(object behaviour, string method)
+    public static void Call(object behaviour, string method)
     {
         behaviour.GetType().GetMethod(method, BindingFlags.NonPublic | BindingFlags.Instance).Invoke(behaviour, null);
     }
 
-    static float[] Flat(Transform t)
+    public static float[] Flat(Transform t)
     {
         return new[] { t.position.x, t.position.y, t.position.z, t.rotation.x, t.rotation.y, t.rotation.z, t.rotation.w };
     }
 
-    static void Print(string what, float[] values)
+    public static void Print(string what, float[] values)
     {
         Console.WriteLine(what + " " + string.Join(" ", values.Select(x => x.ToString("G9"))));
     }

@@ -34,6 +34,27 @@ static class Harness
             case "names":
                 Names();
                 return 0;
+            case "timecode":
+                for (int i = 1; i < args.Length; i++) Timecode(File.ReadAllBytes(args[i]));
+                return 0;
+            case "bone_maps":
+                BoneMaps();
+                return 0;
+            case "arms":
+                Arms();
+                return 0;
+            case "partial":
+                Partial();
+                return 0;
+            case "connect":
+                Connect(args[1].Split(','), int.Parse(args[2]));
+                return 0;
+            case "control":
+                Control(args[1]);
+                return 0;
+            case "websocket":
+                WebSocket(args[1]);
+                return 0;
             case "live":
                 Live(args[1]);
                 return 0;
@@ -166,6 +187,166 @@ static class Harness
             }
             Console.WriteLine(found);
         }
+    }
+
+    static void Timecode(byte[] data)
+    {
+        var frame = new HandsFrame();
+        HandsDecoder.Decode(data, 0, data.Length, frame);
+        Console.WriteLine(frame.Timecode.Text + " " + frame.TimecodeRate.ToString(CultureInfo.InvariantCulture));
+    }
+
+    /// <summary>Prints the meaning of each line as a bone map, sorted by the names of its keys.</summary>
+    static void BoneMaps()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            try
+            {
+                BoneMap map = BoneMap.Parse(line);
+                string[] entries = map.Bones.Select(bone => map.NameOf(bone) + "=" + bone + ";").ToArray();
+                Array.Sort(entries, StringComparer.Ordinal);
+                Console.WriteLine(string.Join("", entries));
+            }
+            catch (ArgumentException error)
+            {
+                Console.WriteLine("error: " + error.Message);
+            }
+        }
+    }
+
+    /// <summary>Reads shoulder, elbow, wrist and target; prints where elbow and wrist arrive.</summary>
+    static void Arms()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            float[] x = line.Split(' ').Select(word => float.Parse(word, CultureInfo.InvariantCulture)).ToArray();
+            var at = new Vec3[4];
+            for (int i = 0; i < 4; i++) at[i] = new Vec3(x[3 * i], x[3 * i + 1], x[3 * i + 2]);
+            Quat upper, lower;
+            ArmIk.Solve(at[0], at[1], at[2], at[3], out upper, out lower);
+            Vec3 elbow = at[0] + upper.Rotate(at[1] - at[0]), wrist = elbow + lower.Rotate(at[2] - at[1]);
+            Console.WriteLine(string.Join(" ", new[] { elbow.X, elbow.Y, elbow.Z, wrist.X, wrist.Y, wrist.Z }.Select(v => Number(v)).ToArray()));
+        }
+    }
+
+    /// <summary>As Retarget, for a rig that has only the bones whose indices are in the line after it.</summary>
+    static void Partial()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            float[] x = line.Split(' ').Select(word => float.Parse(word, CultureInfo.InvariantCulture)).ToArray();
+            var positions = new Vec3[15];
+            var rotations = new Quat[15];
+            var tips = new Vec3[5];
+            for (int i = 0; i < 15; i++)
+            {
+                int at = 1 + 7 * i;
+                positions[i] = new Vec3(x[at], x[at + 1], x[at + 2]);
+                rotations[i] = new Quat(x[at + 3], x[at + 4], x[at + 5], x[at + 6]);
+            }
+            for (int i = 0; i < 5; i++) tips[i] = new Vec3(x[106 + 3 * i], x[107 + 3 * i], x[108 + 3 * i]);
+            var present = new bool[15];
+            foreach (string word in Console.ReadLine().Split(' ')) present[int.Parse(word)] = true;
+            var rig = new HandRig((Side)x[0], positions, rotations, tips, true, present);
+            byte[] data = FromHex(Console.ReadLine());
+            var frame = new HandsFrame();
+            HandsDecoder.Decode(data, 0, data.Length, frame);
+            var output = new Quat[15];
+            rig.Solve(frame.Hand((Side)x[0]), output);
+            Console.WriteLine(string.Join(" ", output.SelectMany(q => new[] { q.X, q.Y, q.Z, q.W }).Select(v => Number(v)).ToArray()));
+        }
+    }
+
+    /// <summary>Connects to the first of several addresses that answers, and prints which one that is.</summary>
+    static void Connect(string[] addresses, int port)
+    {
+        try
+        {
+            var found = addresses.Select(System.Net.IPAddress.Parse).ToArray();
+            using (var socket = new ZmtpSubscriber(1024).ConnectToAny(found, "a name", port)) Console.WriteLine(socket.RemoteEndPoint);
+        }
+        catch (IOException error)
+        {
+            Console.WriteLine("error: " + error.Message);
+        }
+    }
+
+    /// <summary>Sends a request for each line, with its op, names and values separated by tabs, and prints the reply.</summary>
+    static void Control(string address)
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            string[] words = line.Split('\t');
+            object[] fields = words.Skip(1).Select(Value).ToArray();
+            try
+            {
+                Console.WriteLine(new ControlClient(address, 5.0).Ask(words[0], fields));
+            }
+            catch (Exception error) when (error is RequestException || error is IOException || error is System.Net.Sockets.SocketException)
+            {
+                Console.WriteLine(error.GetType().Name + " " + error.Message);
+            }
+        }
+    }
+
+    static object Value(string word)
+    {
+        double number;
+        if (word == "true" || word == "false") return word == "true";
+        return double.TryParse(word, NumberStyles.Float, CultureInfo.InvariantCulture, out number) ? (object)number : word;
+    }
+
+    /// <summary>A web socket that a script drives.</summary>
+    sealed class ScriptedSocket : IWebSocket
+    {
+        public readonly System.Collections.Generic.Queue<byte[]> Waiting = new System.Collections.Generic.Queue<byte[]>();
+        public int Opened;
+        public void Open(string address) { Opened++; State = WebSocketState.Connecting; }
+        public WebSocketState State { get; set; }
+        public int NextLength { get { return Waiting.Count == 0 ? 0 : Waiting.Peek().Length; } }
+        public void Take(byte[] into) { Waiting.Dequeue().CopyTo(into, 0); }
+        public void Skip() { Waiting.Dequeue(); }
+        public void Close() { State = WebSocketState.Closed; }
+    }
+
+    /// <summary>
+    /// Runs lines of a script: `open`, `close`, `message HEX`, `huge`, and `show T`, which prints what a client knows.
+    /// </summary>
+    static void WebSocket(string address)
+    {
+        var socket = new ScriptedSocket();
+        WebSocketClient client;
+        try
+        {
+            client = new WebSocketClient(socket, address);
+        }
+        catch (ArgumentException error)
+        {
+            Console.WriteLine("error: " + error.Message);
+            return;
+        }
+        double start = LocalClock.Now;
+        var frame = new HandsFrame();
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            string[] words = line.Split(' ');
+            if (words[0] == "open") socket.State = WebSocketState.Open;
+            if (words[0] == "close") socket.State = WebSocketState.Closed;
+            if (words[0] == "message") socket.Waiting.Enqueue(FromHex(words[1]));
+            if (words[0] == "huge") socket.Waiting.Enqueue(new byte[Layout.MaxPayloadBytes + 1]);
+            if (words[0] != "show") continue;
+            float weight;
+            bool shown = client.Sample(start + double.Parse(words[1], CultureInfo.InvariantCulture), frame, out weight);
+            Stats stats = client.GetStats();
+            Console.WriteLine(stats.State + "|" + stats.Received + "|" + stats.Refused + "|" + stats.Connections + "|" + socket.Opened + "|" + shown);
+        }
+        client.Dispose();
     }
 
     static byte[] FromHex(string hex)

@@ -13,6 +13,7 @@ from manipnet.synthesis.ik.contacts import EDGES, FRICTION, LEVER_M, add_wrenche
 from manipnet.synthesis.ik.finger_poses import MOST_POSES, touching_poses
 from manipnet.synthesis.ik.grip import (
     ANCHOR,
+    ease_fingers,
     grip_size,
     loosen_anchor,
     move_anchor,
@@ -47,10 +48,10 @@ def bar(tmp_path_factory):
     return build_shape(closed_mesh(mesh.vertices, mesh.faces, "bar"), tmp_path_factory.mktemp("cache"))
 
 
-def scene(shape, speed_m_s, side: Side = "right", bar_moves=True):
+def scene(shape, speed_m_s, side: Side = "right", bar_moves=True, height_m=1.0):
     """A hand with the palm down that moves along x at a constant speed, with the bar in it or at rest below it."""
     offsets = np.linspace(-0.5, 0.5, 21)
-    wrist = np.stack([np.concatenate([[speed_m_s * t, 1.0, 0.0], PALM_DOWN]) for t in offsets])
+    wrist = np.stack([np.concatenate([[speed_m_s * t, height_m, 0.0], PALM_DOWN]) for t in offsets])
     if side == "left":
         wrist = wrist * [-1, 1, 1, 1, -1, -1, 1]
     signs = np.array([-1, 1, 1, 1, -1, -1, 1]) if side == "left" else np.ones(7)
@@ -64,17 +65,22 @@ def improve(skeleton, chains, limits, solid, windows: Windows, count, predicted,
     improve_grips(Hands(skeleton, chains, limits, solid, windows, 0, count, predicted, angles, distances, grips))
 
 
-def run(scenes, ticks, predicted=OPEN, distances=None):
-    """The angles `(N, A)` after some ticks, if fingers do what their grips say."""
+def posed(network, grips):
+    """The angles `(N, A)` of fingers that do what their grips say."""
+    offsets = np.stack([unpack_grip.py_func(row, 5).offsets for row in grips])
+    return np.clip(network + offsets, *HAND.limits.T)
+
+
+def run(scenes, ticks, predicted=OPEN, distances=None, grips=None):
+    """The angles `(N, A)` after some ticks, if fingers do what their grips say; `grips (N, G)` go on if given."""
     count = len(scenes)
-    windows, grips = windows_of(scenes), np.zeros((count, GRIP))
-    network, angles = np.tile(predicted, (count, 1)), np.tile(predicted, (count, 1))
+    windows, grips = windows_of(scenes), np.zeros((count, GRIP)) if grips is None else grips
+    network, hand = np.tile(predicted, (count, 1)), (HAND.skeleton, HAND.chains, HAND.limits)
     distances = np.full((count, 22), 0.012) if distances is None else distances
+    angles = posed(network, grips)
     for _ in range(ticks):
-        hand = HAND.skeleton, HAND.chains, HAND.limits
         improve(*hand, scenes[0].shape.solid, windows, count, network, angles, distances, grips)
-        offsets = np.stack([unpack_grip.py_func(row, 5).offsets for row in grips])
-        angles = np.clip(network + offsets, *HAND.limits.T)
+        angles = posed(network, grips)
     return angles, grips
 
 
@@ -108,7 +114,29 @@ def test_both_hands_mirror_each_other(bar):
 def test_an_object_at_rest_is_not_gripped(bar):
     angles, grips = run([scene(bar, 0.0)], 60)
     np.testing.assert_array_equal(angles[0], OPEN)
-    assert not grips.any()
+    assert not unpack_grip.py_func(grips[0], 5).ages.any()
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_an_object_is_gripped_when_it_leaves_the_place_where_it_lay(bar, side):
+    _, grips = run([scene(bar, 0.0, side, height_m=1.0)], 3)
+    angles, _ = run([scene(bar, 0.3, side, height_m=1.005)], 60, grips=grips)
+    np.testing.assert_array_equal(angles[0], OPEN, err_msg="something else carries it, it is only pushed")
+    for height_m in (1.02, 0.98):
+        lifted = [scene(bar, 0.3, side, height_m=height_m)]
+        angles, _ = run(lifted, 90, grips=grips.copy())
+        assert unexplained_weight(lifted, angles) < physics.RULE.tolerance_m_s2
+
+
+def test_an_object_that_is_held_still_does_not_lie_and_the_hold_comes_to_rest(bar):
+    moving, still = [scene(bar, 0.3)], [scene(bar, 0.0)]
+    _, grips = run(moving, 20)
+    distances, unpack = np.full((1, 22), 0.010), unpack_grip.py_func
+    run(still, 400, grips=grips, distances=distances)
+    before = unpack(grips[0], 5).ages.copy()
+    angles, _ = run(still, 100, grips=grips, distances=distances)
+    np.testing.assert_array_equal(unpack(grips[0], 5).ages[before > 0.0], before[before > 0.0] + 100)
+    assert unexplained_weight(still, angles) < physics.RULE.tolerance_m_s2
 
 
 def test_an_object_that_stays_behind_is_not_gripped(bar):
@@ -203,6 +231,27 @@ def test_a_finger_goes_to_its_pose_without_overshoot_or_jolt():
     steps = np.diff(path[:, 2], prepend=0.0)
     assert np.abs(np.diff(steps, prepend=0.0)).max() < 0.08, "at most an eighth of the way is gained in one tick"
     assert not grip.offsets[HAND.chains.angles[2]].any()
+
+
+def test_a_finger_eases_toward_the_network_and_stays_where_it_is_when_it_is_needed():
+    predicted, numbers = np.zeros(20), np.zeros(GRIP)
+    grip, pose = unpack_grip.py_func(numbers, 5), np.array([0.5, 0.1, 0.6, 0.3])
+    call(take_pose, HAND.chains, 1, pose, grip)
+    for tick in range(60):
+        call(ease_fingers, HAND.chains, 0.05 if tick < 10 else 0.0, predicted, grip)
+        call(move_finger, HAND.chains, 1, predicted, grip)
+    own = HAND.chains.angles[1]
+    np.testing.assert_allclose(grip.offsets[own], pose, atol=1e-3, err_msg="it does not ease before it has arrived")
+    for _ in range(10):
+        call(ease_fingers, HAND.chains, 0.05, predicted, grip)
+        call(move_finger, HAND.chains, 1, predicted, grip)
+    reached = grip.offsets[own].copy()
+    assert np.all(reached < 0.9 * pose)
+    for _ in range(60):
+        call(ease_fingers, HAND.chains, 0.0, predicted, grip)
+        call(move_finger, HAND.chains, 1, predicted, grip)
+    np.testing.assert_allclose(grip.offsets[own], reached, rtol=0.15, err_msg="it stops within a few ticks")
+    assert not grip.poses[HAND.chains.angles[2]].any()
 
 
 def test_an_anchor_is_set_at_the_touch_follows_slowly_and_is_lost_far_away(bar):

@@ -6,6 +6,7 @@ import trimesh
 from compiled import call
 
 from manipnet.demo.player import DEMO_OBJECTS
+from manipnet.synthesis.objects.bvh import least_along
 from manipnet.synthesis.objects.distance_field import field_distance
 from manipnet.synthesis.objects.library import load_library_mesh
 from manipnet.synthesis.objects.mesh import closed_mesh
@@ -67,6 +68,14 @@ def test_points_on_the_surface_have_a_normal(box):
     np.testing.assert_allclose(distance, 0.0, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0, atol=1e-9)
     assert np.all(np.sum(normal * corners, axis=1) > 0.0)
+
+
+@pytest.mark.parametrize("name", ["box", "sphere"])
+def test_the_least_point_along_a_direction_is_that_of_the_vertices(name, request, points):
+    body = request.getfixturevalue(name)
+    for direction in np.vstack([points[:50], np.eye(3), -np.eye(3)]):
+        expected = (body.mesh.vertices @ direction).min()
+        assert call(least_along, body.bvh, direction) == pytest.approx(expected, abs=1e-12)
 
 
 def test_rays_hit_a_sphere_at_the_computed_distance(sphere, points):

@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipnet.inputs.sender_stats import SenderStats
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.repair import is_closed
+from manipnet.wire.bodies import BodyFrame
 from manipnet_tools import cli
 from manipnet_tools.bench.harness import STAGES, TICK, TURN, TickRunner, race
+from manipnet_tools.bench.intake import BONES, CHUNK, Case, cases, frame_of, time_cases
 from manipnet_tools.bench.report import verdicts, with_ratios
 from manipnet_tools.bench.scenarios import demo, endless
 from manipnet_tools.bench.shapes import gourd
@@ -71,6 +74,29 @@ def test_the_command_measures_and_writes_the_figures(
     printed = capsys.readouterr().out
     assert "published interval: p99" in printed
     assert figures["machine"]["processor"] in printed
+
+
+@pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
+def test_every_frame_of_the_intake_reaches_the_tick_thread(case: Case) -> None:
+    received: list[BodyFrame] = []
+    take = case.open(SenderStats(received.append))
+    frames = [frame_of(n, case.bodies) for n in range(CHUNK)]
+    for frame in frames:
+        for datagram in case.write(frame):
+            take(datagram, frame.t_s)
+    assert len(received) == len(frames)
+    for sent, got in zip(frames, received, strict=True):
+        assert got.t_s == pytest.approx(sent.t_s, abs=1e-6)
+        bodies = {body.id: body.tracked for body in got.bodies if body.id is not None}
+        assert [bodies[body.id] for body in sent.bodies if body.id is not None] == [True] * case.bodies
+        extra = BONES if case.name.startswith("NatNet and") else 0
+        assert len(got.bodies) == case.bodies + extra
+
+
+def test_the_intake_is_timed_beside_the_reference() -> None:
+    found = time_cases(lambda: None, 0.0)
+    assert set(found) == {"reference", *(case.name for case in cases())}
+    assert all((durations > 0.0).all() for durations in found.values())
 
 
 def test_only_measured_goals_get_a_verdict() -> None:

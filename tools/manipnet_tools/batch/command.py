@@ -19,6 +19,7 @@ from manipnet.tracking.tick import TICK_HZ
 from manipnet_tools.batch.job import Job, Outcome
 from manipnet_tools.batch.local import run_locally
 from manipnet_tools.commands.options import BatchOptions
+from manipnet_tools.commands.synthesize import profile_of
 from manipnet_tools.takes.bvh_folder import bvh_files
 from manipnet_tools.takes.meshes import named_files
 from manipnet_tools.takes.rigged import read_rig
@@ -78,6 +79,8 @@ def plan(options: BatchOptions) -> list[Job]:
     for file in meshes.values():
         load_mesh(file)  # a mesh that cannot be read would make every take fail
     model, rig = load_bundle(options.model).folder.absolute(), read_rig(options.rig, options.actor)
+    profile_of(options.hand, rig)  # so would a profile
+    hand = options.hand or (None if rig is None else rig.hand)
     names = take_names(options.folder, takes)
     return [
         Job(
@@ -89,6 +92,7 @@ def plan(options: BatchOptions) -> list[Job]:
             rig,
             options.out.absolute() / f"{name}.npz",
             options.up if take.suffix.lower() in TRACKED_FORMATS else "y",
+            None if hand is None else hand.absolute(),
         )
         for take, name in zip(takes, names, strict=True)
     ]

@@ -11,6 +11,7 @@ from typing import Literal
 
 from manipnet import __version__
 from manipnet.common.atomic_file import replacing
+from manipnet.synthesis.hand.profile import read_profile
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.commands.synthesize import read_shapes, synthesise, write_arrays
@@ -42,6 +43,8 @@ class Job:
 
     up: Literal["y", "z"] = "y"
     """The axis that points up in the take."""
+    hand: Path | None = None
+    """The profile of an avatar's hand, on which the take is solved too."""
 
     @property
     def note(self) -> Path:
@@ -101,6 +104,8 @@ def prepare(job: Job) -> Prepared:
     digest = hashlib.sha256(f"{__version__} {_bundle(job.model).model_hash} {job.look_ahead_s} {job.up}".encode())
     if job.rig is not None:
         digest.update(f"{job.rig.actor} {job.rig.text}".encode())
+    if job.hand is not None:
+        digest.update(b" hand " + job.hand.read_bytes())
     of_rig = ((name, file.path) for name, file in sorted(rig_meshes.items()))
     for name, file in [*((file.name, file) for file in take_files(job.take)), *meshes.items(), *of_rig]:
         digest.update(f" {name} {file.stat().st_size} ".encode() + file.read_bytes())
@@ -135,7 +140,8 @@ def _make(prepared: Prepared, advance: Advance, start_s: float) -> Outcome:
         advance(done, total)
 
     advance(0, total)
-    hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count, prepared.rigged.hand_scale)
+    profile = None if job.hand is None else read_profile(job.hand)
+    hands = synthesise(Synthesizer(_bundle(job.model)), ticks, shapes, count, prepared.rigged.hand_scale, profile)
     with replacing(job.out) as file:
         write_arrays(file, ticks, shapes, hands)
     outcome = Outcome(job.name, "done", len(ticks.time_s), time.monotonic() - start_s)

@@ -86,6 +86,7 @@ def lines(figures: Figures, machine: Machine, about: str) -> Iterator[str]:
         yield from _stages(figures["tick"])
     for section, title in (("models", "full width"), ("triangles", "triangles"), ("actors", "actors")):
         yield from _totals(title, figures.get(section, {}))
+    yield from _intake(figures.get("intake", {}))
     yield from _straightforward(figures.get("straightforward", {}))
     yield from _process(figures)
     yield ""
@@ -125,6 +126,13 @@ def _totals(title: str, section: Figures) -> Iterator[str]:
     if "weights" in section:
         apart_mm = section["quantised_apart_mm"]
         yield f"quantised: {section['weights']} weights; random ones put joints at most {apart_mm:.2f} mm apart"
+
+
+def _intake(section: Figures) -> Iterator[str]:
+    if section:
+        yield f"\n{'a frame of bodies':24} {'p50 us':>8}   {'p50 / ref':>9}"
+        for name, row in section.items():
+            yield f"{name:24} {row['p50_us']:8.1f}   {row['p50']:9.4f}"
 
 
 def _straightforward(section: Figures) -> Iterator[str]:

@@ -16,6 +16,7 @@ from manipnet.synthesis.model.features import features
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import windows_of
 from manipnet_tools.bench.harness import STAGES, Race, TickRunner, memory, race
+from manipnet_tools.bench.intake import time_cases
 from manipnet_tools.bench.live import end_to_end, serving, starts
 from manipnet_tools.bench.models import FullWidth, apart_m, quantised, shipped_full_width
 from manipnet_tools.bench.options import Section
@@ -118,6 +119,14 @@ def actors(bench: Bench) -> Figures:
     return {name: _raced(result, name) for name in runners}
 
 
+def intake(bench: Bench) -> Figures:
+    """One frame of each format that a receiver takes, from its bytes to the frame that the tick thread gets."""
+    timed = time_cases(bench.reference, 0.1 * bench.seconds)
+    p50_us = {name: float(1e6 * np.median(durations)) for name, durations in timed.items()}
+    reference_us = p50_us.pop("reference")
+    return {name: {"p50_us": us, "p50": us / reference_us} for name, us in p50_us.items()}
+
+
 def straightforward(bench: Bench) -> Figures:
     """A tick of the straightforward version at full width, and ours, on the same hands."""
     if not STRAIGHTFORWARD.is_file():
@@ -191,6 +200,7 @@ MEASURED: Final[Mapping[Section, Callable[[Bench], Figures]]] = {
     "models": models,
     "triangles": triangles,
     "actors": actors,
+    "intake": intake,
     "straightforward": straightforward,
     "start": start,
     "live": live,

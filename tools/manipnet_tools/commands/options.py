@@ -118,6 +118,8 @@ class SynthesizeOptions:
     """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
+    hand: Annotated[Path | None, _optional("HAND.json")] = None
+    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
 
@@ -128,6 +130,7 @@ class SynthesizeOptions:
         find_bundle(self.model)
         require_look_ahead(self.look_ahead)
         require_file(self.rig)
+        require_file(self.hand)
 
 
 @dataclass(frozen=True)
@@ -152,6 +155,8 @@ class BatchOptions:
     """The rig file that says which body is which; recordings made beside a server, or with --rig, need none."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
+    hand: Annotated[Path | None, _optional("HAND.json")] = None
+    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
     jobs: Annotated[int | None, _optional("N")] = None
@@ -166,6 +171,7 @@ class BatchOptions:
         find_bundle(self.model)
         require_look_ahead(self.look_ahead)
         require_file(self.rig)
+        require_file(self.hand)
         if self.jobs is not None and self.jobs < 1:
             raise ConfigError(f"--jobs is {self.jobs}; it must be at least 1")
 

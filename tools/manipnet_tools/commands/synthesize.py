@@ -9,6 +9,9 @@ from rich.progress import Progress
 
 from manipnet.config.settings import WRISTS
 from manipnet.geometry import Array
+from manipnet.synthesis.carrying import HandCarrier
+from manipnet.synthesis.hand.avatar import avatar_hand
+from manipnet.synthesis.hand.profile import HandProfile, read_profile
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 from manipnet.synthesis.objects.shape import Shape, build_shape
@@ -16,13 +19,16 @@ from manipnet.synthesis.synthesizer import Synthesizer, hand_to_world
 from manipnet_tools.commands.options import SynthesizeOptions
 from manipnet_tools.takes.meshes import MeshFile, named_files, recorded_meshes
 from manipnet_tools.takes.rigged import RigText, read_rig, read_rigged
-from manipnet_tools.takes.rollout import Ticks, hand_inputs, roll_out, tick_take
+from manipnet_tools.takes.rollout import Ticks, hand_inputs, held_objects, roll_out, tick_take
 from manipnet_tools.takes.take import Take, TakeError
 from manipnet_tools.terminal import open_console
 
 
 def run(options: SynthesizeOptions) -> None:
-    """Synthesise and write. Raises `TakeError`, `ConfigError`, `MeshError`, `BundleError` and `OSError`."""
+    """Synthesise and write.
+
+    Raises `TakeError`, `ConfigError`, `MeshError`, `BundleError`, `ProfileError` and `OSError`.
+    """
     console = open_console()
     with console.status("loading take, meshes and model"):
         rig = read_rig(options.rig, options.actor)
@@ -30,10 +36,11 @@ def run(options: SynthesizeOptions) -> None:
         take = rigged.take
         shapes = read_shapes(options.mesh, take, options.take, rig)
         synthesizer = Synthesizer(load_bundle(options.model))
+        profile = profile_of(options.hand, rig)
         ticks = tick_take(take, options.look_ahead)
     with Progress(console=console) as progress:
         task = progress.add_task(take.name, total=2 * len(ticks.time_s))
-        hands = synthesise(synthesizer, ticks, shapes, lambda n: progress.advance(task, n), rigged.hand_scale)
+        hands = synthesise(synthesizer, ticks, shapes, lambda n: progress.advance(task, n), rigged.hand_scale, profile)
     with options.out.open("wb") as file:
         write_arrays(file, ticks, shapes, hands)
     console.print(f"wrote {options.out}: {len(ticks.time_s)} frames at 60 Hz, both hands")
@@ -51,6 +58,12 @@ def write_arrays(file: IO[bytes], ticks: Ticks, shapes: dict[str, Shape], hands:
     if ticks.timecode is not None:
         arrays |= ticks.timecode.arrays()
     np.savez_compressed(file, **arrays)
+
+
+def profile_of(hand: Path | None, rig: RigText | None) -> HandProfile | None:
+    """The avatar's hands: those of the file `hand`, or else of the rig. Raises `ProfileError`."""
+    file = hand or (None if rig is None else rig.hand)
+    return None if file is None else read_profile(file)
 
 
 def read_shapes(meshes: Sequence[str], take: Take, path: Path, rig: RigText | None = None) -> dict[str, Shape]:
@@ -94,10 +107,12 @@ def synthesise(
     shapes: dict[str, Shape],
     advance: Callable[[int], None],
     hand_scale: float = 1.0,
+    profile: HandProfile | None = None,
 ) -> dict[str, Array]:
     """World positions, rotations, distances and positions before inverse kinematics, named as in the file.
 
-    Calls `advance` with the number of hand-ticks done since the last call.
+    With the `profile` of an avatar, its joints and radii too. Calls `advance` with the number of hand-ticks done since
+    the last call.
     """
     inputs = hand_inputs(ticks, shapes, hand_scale)
     arrays: dict[str, Array] = {}
@@ -109,4 +124,11 @@ def synthesise(
         arrays[f"{side}_distances"] = hand_scale * motion.distances
         raw_positions = hand_scale * motion.raw_positions
         arrays[f"{side}_raw_positions"], _ = hand_to_world(side, wrist, raw_positions, motion.rotations)
+        if profile is not None:
+            avatar = avatar_hand(profile.hands[side], side, synthesizer.hand)
+            held = held_objects(ticks, shapes, inputs[side])
+            carrier = HandCarrier(avatar, synthesizer.hand, side)
+            poses = [carrier.step(*each, hand_scale) for each in zip(motion.angles, wrist, held, strict=True)]
+            arrays[f"{side}_hand_joints"] = np.stack([pose.joints for pose in poses])
+            arrays[f"{side}_hand_radii"] = avatar.radii
     return arrays

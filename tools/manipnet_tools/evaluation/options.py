@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from manipnet.synthesis.ik.solvers import solver_named
+from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER, solver_named
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
 from manipnet.synthesis.model.shipped import find_bundle
 from manipnet_tools.commands.checks import require_folder_of
@@ -40,7 +40,7 @@ class EvaluateOptions:
     are missing are trained, which takes long, and kept there."""
     protocol: EvaluationProtocol = "seen"
     """seen: the last 20 % of every take. unseen: every take with a model that has not seen its object."""
-    solver: tuple[str, ...] = ("least_squares", "none")
+    solver: tuple[str, ...] = (DEFAULT_SOLVER, "least_squares", "none")
     """Solvers to test each model with."""
     takes: tuple[str, ...] = ()
     """Test only these takes; all by default."""

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from manipnet.geometry import Side
+from manipnet.wire.rig_names import find_bones
 from manipnet_tools.importing.source import FINGERS, PALM, ImportingError
 
 _WORD: Final = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
@@ -36,6 +37,17 @@ def recognised(names: Iterable[str]) -> dict[str, Joint]:
             joints[name] = (side, 0)
         elif (place := _place(finger, part, with_base=(side, "base") in thumbs)) is not None:
             joints[name] = (side, 1 + 4 * finger + place)
+    joints = _of_rigs(parsed) | joints
+    return {name: joints[name] for name in parsed if name in joints}
+
+
+def _of_rigs(names: Iterable[str]) -> dict[str, Joint]:
+    """The joints whose whole names are those of a known family of rigs."""
+    joints: dict[str, Joint] = {}
+    for side, bones in find_bones(list(names)).items():
+        joints |= {name: (side, 1 + 4 * finger + part) for (finger, part), name in bones.fingers.items()}
+        if bones.hand is not None:
+            joints[bones.hand] = (side, 0)
     return joints
 
 

@@ -20,12 +20,13 @@ from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
 @dataclass(frozen=True)
 class RigText:
     """The text of a rig file, its origin `where` for error messages, the name of one of its actors (by default the
-    first), and the meshes of that actor's props."""
+    first), the meshes of that actor's props, and the profile of its avatar's hand."""
 
     text: str
     where: str
     actor: str | None = None
     meshes: Mapping[str, MeshFile] = field(default_factory=dict)
+    hand: Path | None = None
 
     def config(self) -> ActorConfig:
         """The actor's configuration. Raises `ConfigError` and `TakeError`."""
@@ -49,8 +50,9 @@ def read_rig(file: Path | None, actor: str | None = None) -> RigText | None:
         return None
     actors = {one.name: one for one in load_rig(file).actors}
     rig = RigText(file.read_text(encoding="utf-8-sig"), str(file), actor)
-    props = actors[rig.config().name].objects
-    return replace(rig, meshes={prop.name: MeshFile(prop.mesh.absolute(), prop.unit, prop.scale) for prop in props})
+    own = actors[rig.config().name]
+    meshes = {prop.name: MeshFile(prop.mesh.absolute(), prop.unit, prop.scale) for prop in own.objects}
+    return replace(rig, meshes=meshes, hand=None if own.hand is None else own.hand.absolute())
 
 
 def read_rigged(path: Path, rig: RigText | None = None, up: Literal["y", "z"] = "y") -> RiggedTake:

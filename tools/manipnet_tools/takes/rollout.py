@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from manipnet.actors.props import Prop, choose_prop
 from manipnet.geometry import SIDES, Array, Side, scale_positions
+from manipnet.synthesis.carrying import Held
 from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.synthesis.synthesizer import HandScene, HandStep, Synthesizer
@@ -172,6 +173,12 @@ def hand_inputs(ticks: Ticks, shapes: dict[str, Shape], hand_scale: float = 1.0)
             1.0 / hand_scale,
         )
     return inputs
+
+
+def held_objects(ticks: Ticks, shapes: dict[str, Shape], hand: HandInput) -> list[Held]:
+    """The object that a hand handles at each tick, with its pose in the world."""
+    names = list(shapes)
+    return [(shapes[names[k]], ticks.bodies[names[k]].poses[tick], 1.0) for tick, k in enumerate(hand.held)]
 
 
 def _held(ticks: Ticks, side: Side, shapes: dict[str, Shape]) -> NDArray[np.int64]:

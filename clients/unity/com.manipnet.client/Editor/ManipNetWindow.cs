@@ -4,7 +4,7 @@ using UnityEngine;
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// Tests a connection without play mode, shows the state of all receivers, and sets up a character.
+    /// Tests a connection without play mode, shows the state of all receivers, sets up a character, and records takes.
     /// </summary>
     public sealed class ManipNetWindow : EditorWindow
     {
@@ -45,6 +45,9 @@ namespace ManipNet.Client.Unity
                 EditorGUILayout.LabelField(receiver.name, receiver.Address);
                 Show(receiver.Stats);
             }
+            foreach (ManipNetControl control in Resources.FindObjectsOfTypeAll<ManipNetControl>()) Control(control);
+            if (EditorApplication.isPlaying)
+                foreach (ManipNetRecorder recorder in Resources.FindObjectsOfTypeAll<ManipNetRecorder>()) Record(recorder);
             EditorGUILayout.Space();
             Animator selected = Selection.activeGameObject == null ? null : Selection.activeGameObject.GetComponent<Animator>();
             EditorGUI.BeginDisabledGroup(selected == null);
@@ -86,9 +89,56 @@ namespace ManipNet.Client.Unity
             GameObject on = character.gameObject;
             ManipNetReceiver receiver = on.GetComponent<ManipNetReceiver>();
             if (receiver == null) receiver = Undo.AddComponent<ManipNetReceiver>(on);
-            receiver.Address = _address;
+            Change(receiver, () => receiver.Address = _address);
             foreach (Side side in new[] { Side.Left, Side.Right })
-                Undo.AddComponent<ManipNetHand>(on).Configure(receiver, side, character, null, false);
+            {
+                ManipNetHand hand = HandOf(on, side);
+                if (hand != null) continue; // it keeps its settings
+                hand = Undo.AddComponent<ManipNetHand>(on);
+                Change(hand, () => hand.Configure(receiver, side, character, null, WristMode.Keep));
+            }
+            ManipNetRecorder recorder = on.GetComponent<ManipNetRecorder>();
+            if (recorder != null) return;
+            recorder = Undo.AddComponent<ManipNetRecorder>(on);
+            Change(recorder, () => recorder.Configure(receiver, on.transform));
+        }
+
+        static ManipNetHand HandOf(GameObject on, Side side)
+        {
+            foreach (ManipNetHand hand in on.GetComponents<ManipNetHand>())
+                if (hand.Side == side) return hand;
+            return null;
+        }
+
+        /// <summary>Changes a component so that Undo takes it back and an instance of a prefab keeps it.</summary>
+        static void Change(Component component, System.Action change)
+        {
+            Undo.RecordObject(component, "Set up ManipNet hands");
+            change();
+            PrefabUtility.RecordPrefabInstancePropertyModifications(component);
+        }
+
+        static void Control(ManipNetControl control)
+        {
+            EditorGUILayout.Space();
+            EditorGUILayout.LabelField(control.name, control.IsBusy ? "waiting for the server" : control.LastReply);
+            if (GUILayout.Button("Record on the server")) control.Record("unity");
+            if (GUILayout.Button("Stop recording on the server")) control.StopRecording();
+            if (GUILayout.Button("Pause the server")) control.Pause(true);
+            if (GUILayout.Button("Continue")) control.Pause(false);
+        }
+
+        static void Record(ManipNetRecorder recorder)
+        {
+            if (!recorder.IsRecording)
+            {
+                if (GUILayout.Button("Record " + recorder.name)) recorder.Begin();
+                return;
+            }
+            EditorGUILayout.LabelField("Recording", recorder.Length.ToString("0.0") + " s");
+            if (!GUILayout.Button("Stop and save " + recorder.name)) return;
+            string path = ManipNetTakes.Save(recorder);
+            EditorUtility.DisplayDialog("ManipNet", path == null ? "Nothing was recorded: no hands have arrived." : "The take is " + path + ".", "OK");
         }
     }
 }

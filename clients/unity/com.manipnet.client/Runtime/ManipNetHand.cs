@@ -1,11 +1,25 @@
+using System;
 using System.Collections.Generic;
 using UnityEngine;
 
 namespace ManipNet.Client.Unity
 {
+    /// <summary>What follows the tracked wrist.</summary>
+    public enum WristMode
+    {
+        /// <summary>Nothing: something else moves the arms.</summary>
+        Keep,
+
+        /// <summary>The hand, and the arm by two-bone IK.</summary>
+        Arm,
+
+        /// <summary>An object that an IK solver uses as its target.</summary>
+        Target,
+    }
+
     /// <summary>
-    /// Moves the fingers of a rig, which is a Humanoid or has bones with known names under `root`. The rig's pose at
-    /// the moment when this component is enabled counts as its rest pose.
+    /// Moves the fingers of a rig, which is a Humanoid or has bones with known names under `root`. A Humanoid rests as its
+    /// Avatar says; another rig as it is when this component is enabled.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Hand")]
     [DefaultExecutionOrder(100)]
@@ -17,41 +31,82 @@ namespace ManipNet.Client.Unity
         [Tooltip("Humanoid whose fingers move. Leave it empty to use bones by name under the root.")]
         [SerializeField] Animator animator;
 
-        [Tooltip("Object under which bones are found by the names of Unity, VMC, Mixamo, Unreal, Rigify or VRoid.")]
+        [Tooltip("Object under which bones are found by their names.")]
         [SerializeField] Transform root;
+
+        [Tooltip("JSON that names bones with other names: {\"LeftHandIndex1\": \"a bone of the rig\"}.")]
+        [SerializeField] TextAsset boneMap;
 
         [Tooltip("Makes the bones point where the synthesised ones do, whatever the rest pose of the rig is.")]
         [SerializeField] bool correctRestPose = true;
 
-        [Tooltip("Also moves the hand to the tracked wrist. Turn it off if something else moves the arms.")]
-        [SerializeField] bool moveWrist;
+        [Tooltip("What follows the tracked wrist: nothing, the hand and the arm, or a target for your own IK.")]
+        [SerializeField] WristMode wrist = WristMode.Keep;
 
-        readonly Transform[] _bones = new Transform[HandRig.BoneCount];
+        [Tooltip("Object that is moved to the wrist, with the rotation that the hand bone should have.")]
+        [SerializeField] Transform wristTarget;
+
         readonly Quat[] _rotations = new Quat[HandRig.BoneCount];
-        Transform _hand;
+        HandBones _bones;
         HandRig _rig;
 
-        public void Configure(ManipNetReceiver from, Side which, Animator humanoid, Transform under, bool wrist)
+        public void Configure(ManipNetReceiver from, Side which, Animator humanoid, Transform under, WristMode mode)
         {
             receiver = from;
             side = which;
             animator = humanoid;
             root = under;
-            moveWrist = wrist;
+            wrist = mode;
             if (isActiveAndEnabled) OnEnable();
+        }
+
+        public Side Side
+        {
+            get { return side; }
+        }
+
+        /// <summary>Sets the map of bones with unknown names, and finds the bones anew.</summary>
+        public void SetBoneMap(TextAsset map)
+        {
+            boneMap = map;
+            if (isActiveAndEnabled) OnEnable();
+        }
+
+        /// <summary>Sets the object that is moved to the wrist in the mode Target.</summary>
+        public void SetWristTarget(Transform target)
+        {
+            wristTarget = target;
+        }
+
+        /// <summary>The bones that this component turns; null while there are none.</summary>
+        public HandBones Bones
+        {
+            get { return _rig == null ? null : _bones; }
         }
 
         void OnEnable()
         {
             _rig = null;
             if (receiver == null || animator == null && root == null) return;
-            var missing = new List<string>();
-            FindBones(missing);
-            if (missing.Count > 0)
-                Debug.LogError("ManipNet: no bone for " + string.Join(", ", missing.ToArray()) + " of the " + (side == Side.Left ? "left" : "right")
-                    + " hand; use a Humanoid, or a root whose bones have known names", this);
-            else
-                _rig = Bind();
+            try
+            {
+                _bones = HandBones.Find(animator, root, side, BoneMap.Parse(boneMap == null ? null : boneMap.text));
+            }
+            catch (ArgumentException error)
+            {
+                Debug.LogError("ManipNet: " + error.Message, this);
+                return;
+            }
+            Report(_bones.Missing());
+            if (_bones.Hand != null && _bones.AnyFinger) _rig = Bind();
+        }
+
+        void Report(List<string> missing)
+        {
+            if (missing.Count == 0) return;
+            string what = "ManipNet: no bone for " + string.Join(", ", missing.ToArray()) + " of the " + (side == Side.Left ? "left" : "right") + " hand";
+            if (_bones.Hand != null && _bones.AnyFinger) Debug.LogWarning(what + "; the other bones move", this);
+            else Debug.LogError(what + "; use a Humanoid, a root whose bones have known names, or a bone map", this);
         }
 
         void LateUpdate()
@@ -60,68 +115,89 @@ namespace ManipNet.Client.Unity
             HandFrame hand = receiver.Hands.Hand(side);
             if (!hand.Present) return;
             float weight = receiver.Weight;
-            if (moveWrist)
-            {
-                Quaternion turned = ManipNetPose.ToUnity(_rig.HandRotation(hand));
-                _hand.position = Vector3.Lerp(_hand.position, ManipNetPose.Position(hand.Wrist, 0), weight);
-                _hand.rotation = Quaternion.Slerp(_hand.rotation, turned, weight);
-            }
+            if (wrist != WristMode.Keep) MoveWrist(hand, weight);
             _rig.Solve(hand, _rotations);
-            Quaternion space = _hand.rotation;
-            for (int i = 0; i < _bones.Length; i++)
+            Quaternion space = _bones.Hand.rotation;
+            for (int i = 0; i < _rotations.Length; i++)
             {
+                if (_bones.Fingers[i] == null) continue;
                 Quaternion turned = space * ManipNetPose.ToUnity(_rotations[i]);
-                _bones[i].rotation = Quaternion.Slerp(_bones[i].rotation, turned, weight);
+                _bones.Fingers[i].rotation = Quaternion.Slerp(_bones.Fingers[i].rotation, turned, weight);
             }
         }
 
-        void FindBones(List<string> missing)
+        void MoveWrist(HandFrame hand, float weight)
         {
-            bool humanoid = animator != null && animator.isHuman;
-            Transform[] all = humanoid ? new Transform[0] : (root != null ? root : animator.transform).GetComponentsInChildren<Transform>(true);
-            _hand = humanoid ? animator.GetBoneTransform(side == Side.Left ? HumanBodyBones.LeftHand : HumanBodyBones.RightHand) : null;
-            bool metacarpal = false;
-            foreach (Transform t in all)
+            Vector3 position = ManipNetPose.Position(hand.Wrist, 0);
+            Quaternion rotation = ManipNetPose.ToUnity(_rig.HandRotation(hand));
+            if (wrist == WristMode.Arm) MoveArm(position, rotation, weight);
+            else if (wristTarget != null)
             {
-                if (RigNames.IsHand(t.name, side)) _hand = t;
-                metacarpal |= RigNames.IsThumbMetacarpal(t.name, side);
-            }
-            if (_hand == null) missing.Add("Hand");
-            for (int i = 0; i < _bones.Length; i++)
-            {
-                int finger = i / 3, part = i % 3;
-                _bones[i] = humanoid ? animator.GetBoneTransform(HumanBone(i)) : null;
-                foreach (Transform t in all)
-                    if (RigNames.Matches(t.name, side, finger, part, metacarpal)) _bones[i] = t;
-                if (_bones[i] == null) missing.Add(HandRig.Fingers[finger] + HandRig.Parts[part]);
+                wristTarget.position = position;
+                wristTarget.rotation = rotation;
             }
         }
 
-        HumanBodyBones HumanBone(int i)
+        void MoveArm(Vector3 position, Quaternion rotation, float weight)
         {
-            return (side == Side.Left ? HumanBodyBones.LeftThumbProximal : HumanBodyBones.RightThumbProximal) + i;
+            Transform hand = _bones.Hand, lower = _bones.LowerArm, upper = _bones.UpperArm;
+            Vector3 target = Vector3.Lerp(hand.position, position, weight);
+            Quaternion turned = Quaternion.Slerp(hand.rotation, rotation, weight);
+            if (lower != null && upper != null)
+            {
+                Quat upperTurn, lowerTurn;
+                ArmIk.Solve(ManipNetPose.FromUnity(upper.position), ManipNetPose.FromUnity(lower.position),
+                    ManipNetPose.FromUnity(hand.position), ManipNetPose.FromUnity(target), out upperTurn, out lowerTurn);
+                Quaternion newLower = ManipNetPose.ToUnity(lowerTurn) * lower.rotation;
+                upper.rotation = ManipNetPose.ToUnity(upperTurn) * upper.rotation;
+                lower.rotation = newLower;
+            }
+            else
+            {
+                hand.position = target; // a rig that is only a hand
+            }
+            hand.rotation = turned;
         }
 
         HandRig Bind()
         {
             var positions = new Vec3[HandRig.BoneCount];
             var rotations = new Quat[HandRig.BoneCount];
+            var present = new bool[HandRig.BoneCount];
             var tips = new Vec3[HandRig.Fingers.Length];
-            Quaternion toHand = Quaternion.Inverse(_hand.rotation);
+            var rest = new RestPose(animator);
             for (int i = 0; i < HandRig.BoneCount; i++)
             {
-                positions[i] = ManipNetPose.FromUnity(toHand * (_bones[i].position - _hand.position));
-                rotations[i] = ManipNetPose.FromUnity(toHand * _bones[i].rotation);
+                Transform bone = _bones.Fingers[i];
+                if (bone == null) continue;
+                present[i] = true;
+                rotations[i] = RestIn(rest, bone, out positions[i]);
+                tips[i / 3] = End(rest, bone, positions[i], i, positions);
             }
-            for (int finger = 0; finger < tips.Length; finger++)
+            return new HandRig(side, positions, rotations, tips, correctRestPose, present);
+        }
+
+        /// <summary>The end of a finger's last bone: its first child, or where the bone before it points.</summary>
+        Vec3 End(RestPose rest, Transform bone, Vec3 position, int index, Vec3[] positions)
+        {
+            Vec3 end;
+            if (bone.childCount > 0)
             {
-                Transform last = _bones[3 * finger + 2];
-                Vec3 end = positions[3 * finger + 2];
-                tips[finger] = last.childCount > 0
-                    ? ManipNetPose.FromUnity(toHand * (last.GetChild(0).position - _hand.position))
-                    : end + (end - positions[3 * finger + 1]);
+                RestIn(rest, bone.GetChild(0), out end);
+                return end;
             }
-            return new HandRig(side, positions, rotations, tips, correctRestPose);
+            int before = index - 1;
+            while (before >= index - index % 3 && _bones.Fingers[before] == null) before--;
+            return before >= index - index % 3 ? position + (position - positions[before]) : 2f * position;
+        }
+
+        Quat RestIn(RestPose rest, Transform bone, out Vec3 position)
+        {
+            Vector3 at;
+            Quaternion turned;
+            rest.InSpaceOf(_bones.Hand, bone, out at, out turned);
+            position = ManipNetPose.FromUnity(at);
+            return ManipNetPose.FromUnity(turned);
         }
     }
 }

@@ -17,13 +17,17 @@ namespace ManipNet.Client.Unity
         [Tooltip("Object that is shown at every created joint; may be empty.")]
         [SerializeField] GameObject marker;
 
+        [Tooltip("Diameter in metres of the sphere that is shown at every created joint if there is no marker; 0 for none.")]
+        [SerializeField] float sphere;
+
         readonly Transform[] _joints = new Transform[Layout.JointCount];
 
-        public void Configure(ManipNetReceiver from, Side which, GameObject shown)
+        public void Configure(ManipNetReceiver from, Side which, GameObject shown, float sphereDiameter = 0f)
         {
             receiver = from;
             side = which;
             marker = shown;
+            sphere = sphereDiameter;
         }
 
         /// <summary>The name of a joint in XR Hands, for example IndexProximal for index_proximal.</summary>
@@ -47,7 +51,9 @@ namespace ManipNet.Client.Unity
 
         Transform Create(string jointName)
         {
-            GameObject made = marker == null ? new GameObject() : Instantiate(marker);
+            GameObject made = marker != null ? Instantiate(marker)
+                : sphere > 0f ? GameObject.CreatePrimitive(PrimitiveType.Sphere) : new GameObject();
+            if (marker == null && sphere > 0f) made.transform.localScale = sphere * Vector3.one;
             made.name = jointName;
             made.transform.SetParent(transform, false);
             return made.transform;

@@ -4,8 +4,8 @@ using UnityEngine;
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// Receives hands on its own thread while it is enabled, and computes the pose to show once per frame, before the
-    /// components that use it.
+    /// Receives hands while it is enabled, and computes the pose to show once per frame, before the components that use
+    /// it. It reads ZeroMQ on a thread of its own; in a WebGL build it reads the browser's web socket instead.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Receiver")]
     [DefaultExecutionOrder(-100)]
@@ -14,6 +14,9 @@ namespace ManipNet.Client.Unity
         [Tooltip("Address for hands in the server's line `ready`.")]
         [SerializeField] string address = "tcp://127.0.0.1:5555";
 
+        [Tooltip("Address of the web socket in the server's line `ready`. Only WebGL builds use it, because a browser allows no other.")]
+        [SerializeField] string webAddress = "ws://127.0.0.1:8081";
+
         [Tooltip("Actor whose hands are shown; empty for the first one received.")]
         [SerializeField] string actor = "";
 
@@ -21,7 +24,8 @@ namespace ManipNet.Client.Unity
         [SerializeField, Range(0f, 0.5f)] float delay = 0.1f;
 
         readonly HandsFrame _hands = new HandsFrame();
-        ManipNetClient _client;
+        IHandsClient _client;
+        string _connectedTo;
         float _weight;
 
         /// <summary>
@@ -45,29 +49,53 @@ namespace ManipNet.Client.Unity
             get { return _client == null ? new Stats { State = "off" } : _client.GetStats(); }
         }
 
+        /// <summary>The address for hands; a new one takes effect in the next frame.</summary>
         public string Address
         {
             get { return address; }
-            set
-            {
-                address = value;
-                if (_client == null) return;
-                OnDisable();
-                OnEnable();
-            }
+            set { address = value; }
+        }
+
+        /// <summary>The actor whose hands are shown; a new one takes effect in the next frame.</summary>
+        public string Actor
+        {
+            get { return actor; }
+            set { actor = value; }
+        }
+
+        /// <summary>The web socket for WebGL builds; a new one takes effect in the next frame.</summary>
+        public string WebAddress
+        {
+            get { return webAddress; }
+            set { webAddress = value; }
+        }
+
+        /// <summary>What the client was made for; it is made anew when that changes, as in the Inspector.</summary>
+        string Wanted
+        {
+            get { return address + "\n" + webAddress + "\n" + actor; }
         }
 
         void OnEnable()
         {
+            _connectedTo = Wanted;
             try
             {
-                _client = new ManipNetClient(address, actor, delay);
+                _client = Connect();
             }
             catch (ArgumentException error)
             {
                 Debug.LogError("ManipNet: " + error.Message, this);
-                enabled = false;
             }
+        }
+
+        IHandsClient Connect()
+        {
+#if UNITY_WEBGL && !UNITY_EDITOR
+            return new WebSocketClient(new BrowserWebSocket(), webAddress, actor, delay);
+#else
+            return new ManipNetClient(address, actor, delay);
+#endif
         }
 
         /// <summary>Unity also calls this before it reloads scripts, which the thread must not outlive.</summary>
@@ -85,6 +113,11 @@ namespace ManipNet.Client.Unity
 
         void LateUpdate()
         {
+            if (_connectedTo != Wanted)
+            {
+                OnDisable();
+                OnEnable();
+            }
             HasHands = _client != null && _client.Sample(LocalClock.Now, _hands, out _weight);
         }
     }

@@ -108,7 +108,7 @@ class NatNetBodies(Receiver):
         self._command = UdpThread(
             bind_udp(interface, 0),
             lambda: bind_udp(interface, 0),
-            self._receive,
+            self.receive,
             self._do_chores,
             self._lost,
             health,
@@ -201,8 +201,9 @@ class NatNetBodies(Receiver):
 
     # Packets
 
-    def _receive(self, packet: bytes, sender: Address, now_s: float) -> None:
-        source = f"natnet:{sender[0]}:{sender[1]}"
+    def receive(self, packet: bytes, sender: Address, now_s: float) -> None:
+        """Take one packet that `sender` has sent. Belongs to the thread of the socket."""
+        source = _source_of(sender)
         if not self._rate_limiter.admits(sender, now_s):
             self._intake.drop("rate", "natnet", "more packets than are read from senders that are not known yet")
             return
@@ -265,7 +266,7 @@ class NatNetBodies(Receiver):
             except ListenError as error:
                 return str(error)
             health = ReceiverHealth("natnet-multicast", self._intake.telemetry)
-            self._data = UdpThread(data, join, self._receive, lambda now_s: CHORES_S, self._lost, health)
+            self._data = UdpThread(data, join, self.receive, lambda now_s: CHORES_S, self._lost, health)
             self._data.start()
         return None
 
@@ -287,17 +288,20 @@ class NatNetBodies(Receiver):
         samples = [self._sample(body, body.id, names.get(body.id)) for body in frame.bodies]
         self._refuse_twice(samples)
         if frame.skeletons:
-            bones = list(self._names.bones(frame))
-            self._nameless_bones = sum(len(each.bones) for each in frame.skeletons) - len(bones)
-            room = MAX_BODIES - len(samples)
-            self._bones_left_out = max(len(bones) - room, 0)
-            samples += [self._sample(bone, None, name) for name, bone in bones[:room]]
+            self._add_bones(samples, frame)
         self._sender_clock.clocks[0].note(frame.timestamp_s, now_s)
         t_s = self._sender_clock.choose((frame.timestamp_s,), now_s, repeats=False)
         timecode = frame.timecode
         rate = None if timecode is None else self._timecode_rate.note(timecode)
         assert t_s is not None  # every frame has a time stamp
         return BodyFrame(t_s, frame.number, tuple(samples), now_s, source, timecode, rate)
+
+    def _add_bones(self, samples: list[BodySample], frame: MocapFrame) -> None:
+        bones = list(self._names.bones(frame))
+        self._nameless_bones = sum([len(each.bones) for each in frame.skeletons]) - len(bones)
+        room = MAX_BODIES - len(samples)
+        self._bones_left_out = max(len(bones) - room, 0)
+        samples += [self._sample(bone, None, name) for name, bone in bones[:room]]
 
     def _refuse_twice(self, samples: list[BodySample]) -> None:
         """Two bodies with one streaming id are lost, since nobody can tell which of them is meant."""
@@ -330,10 +334,10 @@ class NatNetBodies(Receiver):
                 _log.warning("NatNet: %s", text)
 
     def _sample(self, body: RigidBody, id: int | None, name: str | None) -> BodySample:
-        (x, y, z), (qx, qy, qz, qw) = body.p, body.q
+        _, x, y, z, qx, qy, qz, qw, _, params = body
         if self._up == "z":  # turn by -90 degrees about x: z becomes y, y becomes -z
-            (x, y, z), (qx, qy, qz) = (x, z, -y), (qx, qz, -qy)
-        return make_sample(id, name, (x, y, z), (qx, qy, qz, qw), body.tracked)
+            y, z, qy, qz = z, -y, qz, -qy
+        return make_sample(id, name, (x, y, z), (qx, qy, qz, qw), params & 1 == 1)
 
     def _report(self, problem: str | None) -> None:
         """Log a problem once. The problem is assigned in one step, so that it does not flicker in the status."""
@@ -343,3 +347,8 @@ class NatNetBodies(Receiver):
 
     def _lost(self, count: int) -> None:
         self._intake.drop("kernel", "natnet", "the socket's buffer was full", count)
+
+
+@functools.lru_cache(maxsize=64)
+def _source_of(sender: Address) -> str:
+    return f"natnet:{sender[0]}:{sender[1]}"

@@ -10,6 +10,10 @@ MAX_PARTS: Final = 1_024
 """Parts of variable length that one packet may have, so that no packet takes long to read."""
 
 
+_INT32: Final = struct.Struct("<i")
+_HEAD: Final = struct.Struct("<ii")
+
+
 class Cursor:
     """A position in one payload. It stays within the payload and limits the number of parts."""
 
@@ -20,7 +24,7 @@ class Cursor:
 
     def skip(self, size: int) -> None:
         if size > self._size - self._offset:
-            raise MessageError(f"a NatNet payload ends at byte {self._size}, where {size} more are needed")
+            raise self._too_short(size)
         self._offset += size
 
     def part(self) -> None:
@@ -29,9 +33,12 @@ class Cursor:
             raise MessageError(f"a NatNet payload has more than {MAX_PARTS} parts")
 
     def unpack(self, layout: struct.Struct) -> tuple:
-        start = self._offset
-        self.skip(layout.size)
-        return layout.unpack_from(self._data, start)
+        try:
+            values = layout.unpack_from(self._data, self._offset)
+        except struct.error:
+            raise self._too_short(layout.size) from None
+        self._offset += layout.size
+        return values
 
     def rows(self, layout: struct.Struct, count: int, extra: int = 0) -> Iterable[tuple]:
         """The values of `count` structures in a row, each of which is followed by `extra` bytes."""
@@ -42,17 +49,12 @@ class Cursor:
         return [layout.unpack_from(self._data, start + i * size) for i in range(count)]
 
     def int32(self) -> int:
-        start = self._offset
-        end = self._offset = start + 4
-        if end > self._size:
-            self._offset = start
-            self.skip(4)
-        return int.from_bytes(self._data[start:end], "little", signed=True)
+        return self.unpack(_INT32)[0]
 
     def count(self) -> int:
-        count = self.int32()
+        (count,) = self.unpack(_INT32)
         if not 0 <= count <= self._size:
-            raise MessageError(f"a NatNet payload of {self._size} bytes announces {count} elements")
+            raise self._too_many(count)
         return count
 
     def text(self) -> bytes:
@@ -68,13 +70,34 @@ class Cursor:
 
     def section(self) -> "Cursor":
         """A cursor over the section whose byte size comes next. This cursor moves behind the section."""
-        start = self._offset + 4
-        self.skip_section()
+        return self.cut(self._checked_size(self.int32()))
+
+    def cut(self, size: int) -> "Cursor":
+        """A cursor over the next `size` bytes. This cursor moves behind them."""
+        start = self._offset
+        self.skip(size)
         return Cursor(self._data[start : self._offset])
 
-    def skip_section(self) -> None:
-        """Move behind the section whose byte size comes next."""
-        size = self.int32()
+    def head(self) -> tuple[int, int]:
+        """The number of elements in the section that comes next, and its size in bytes."""
+        count, size = self.unpack(_HEAD)
+        if not 0 <= count <= self._size:
+            raise self._too_many(count)
+        return count, self._checked_size(size)
+
+    def skip_section(self) -> int:
+        """Move behind the section that comes next, and return the number of its elements."""
+        count, size = self.head()
+        self._offset += size
+        return count
+
+    def _checked_size(self, size: int) -> int:
         if not 0 <= size <= self._size - self._offset:
             raise MessageError(f"a NatNet section announces {size} bytes, but {self.left()} are left")
-        self._offset += size
+        return size
+
+    def _too_short(self, size: int) -> MessageError:
+        return MessageError(f"a NatNet payload ends at byte {self._size}, where {size} more are needed")
+
+    def _too_many(self, count: int) -> MessageError:
+        return MessageError(f"a NatNet payload of {self._size} bytes announces {count} elements")

@@ -7,7 +7,7 @@ and the Python client of the NatNet SDK, whose readers name the version of each 
 """
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Final, NamedTuple
 
 from manipnet.inputs.natnet.cursor import Cursor
@@ -32,13 +32,33 @@ _MARKER = 20
 
 
 class RigidBody(NamedTuple):
-    """One body as it was streamed: `p` in the server's units and axes, and `q` xyzw, not normalised."""
+    """One body as it was streamed: its position in the server's units and axes, and xyzw, which is not normalised."""
 
     id: int
-    p: tuple[float, float, float]
-    q: tuple[float, float, float, float]
+    x: float
+    y: float
+    z: float
+    qx: float
+    qy: float
+    qz: float
+    qw: float
     mean_error: float
-    tracked: bool
+    params: int
+
+    @property
+    def p(self) -> tuple[float, float, float]:
+        """The position."""
+        return self.x, self.y, self.z
+
+    @property
+    def q(self) -> tuple[float, float, float, float]:
+        """The quaternion."""
+        return self.qx, self.qy, self.qz, self.qw
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the server sees the body."""
+        return self.params & 1 == 1
 
 
 class Skeleton(NamedTuple):
@@ -46,6 +66,10 @@ class Skeleton(NamedTuple):
 
     id: int
     bones: tuple[RigidBody, ...]
+
+
+_Found = tuple[tuple[RigidBody, ...], tuple[Skeleton, ...]]
+"""The bodies and the skeletons of a frame."""
 
 
 class MocapFrame(NamedTuple):
@@ -70,20 +94,9 @@ class MocapFrame(NamedTuple):
 def read_frame(payload: bytes, version: Version) -> MocapFrame:
     """Read the payload of a frame packet of the given version."""
     cursor = Cursor(payload)
-    sized, has_markers = version >= SIZED, version < MODERN
-    unused: dict[str, int] = {}
     number = cursor.int32()
-    _skip(cursor, sized, _marker_set)
-    _skip(cursor, sized, lambda c: c.skip(_VECTOR), "unlabelled markers", unused)
-    bodies = _read_bodies(cursor, sized, has_markers)
-    skeletons = _read_skeletons(cursor, sized, has_markers)
-    if sized:
-        _skip(cursor, sized, _nothing, "assets", unused)  # new in 4.1
-    _skip(cursor, sized, lambda c: c.skip(22 if has_markers else 26), "labelled markers", unused)
-    if version >= (2, 9):
-        _skip(cursor, sized, _analog, "force plates", unused)
-    if version >= (2, 11):
-        _skip(cursor, sized, _analog, "devices", unused)
+    unused: dict[str, int] = {}
+    bodies, skeletons = (_read_sized if version >= SIZED else _read_plain)(cursor, version, unused)
     timecode, timestamp_s, stamps, flags = _read_suffix(cursor, version)
     if not abs(timestamp_s) <= MAX_TIME_S:
         raise MessageError(f"NatNet frame {number} has the time {timestamp_s}; it must be finite, in seconds")
@@ -101,6 +114,34 @@ def read_frame(payload: bytes, version: Version) -> MocapFrame:
     )
 
 
+def _read_sized(cursor: Cursor, version: Version, unused: dict[str, int]) -> _Found:
+    """Read the sections of a version in which each section states its size."""
+    cursor.skip_section()  # marker sets
+    _note(unused, "unlabelled markers", cursor.skip_section())
+    bodies = _sized_bodies(cursor)
+    skeletons = _sized_skeletons(cursor)
+    for name in ("assets", "labelled markers", "force plates", "devices"):
+        _note(unused, name, cursor.skip_section())
+    return bodies, skeletons
+
+
+def _read_plain(cursor: Cursor, version: Version, unused: dict[str, int]) -> _Found:
+    """Read the sections of a version in which only the layout of their elements tells their size."""
+    has_markers = version < MODERN
+    _skip(cursor, _marker_set)
+    _note(unused, "unlabelled markers", _skip(cursor, _vector))
+    count = cursor.count()
+    _check_count(count)
+    bodies = _read_bodies(cursor, count, has_markers)
+    skeletons = _plain_skeletons(cursor, has_markers)
+    _note(unused, "labelled markers", _skip(cursor, _old_marker if has_markers else _labelled_marker))
+    if version >= (2, 9):
+        _note(unused, "force plates", _skip(cursor, _analog))
+    if version >= (2, 11):
+        _note(unused, "devices", _skip(cursor, _analog))
+    return bodies, skeletons
+
+
 def _read_suffix(cursor: Cursor, version: Version) -> tuple[int, float, tuple[int, int, int], int]:
     """Timecode, time stamp, the three stamps of the clock (zero before 3.0), and flags."""
     if version < MODERN:
@@ -110,73 +151,93 @@ def _read_suffix(cursor: Cursor, version: Version) -> tuple[int, float, tuple[in
     return suffix[0], suffix[2], suffix[3:6], suffix[-1]
 
 
-def _skip(
-    cursor: Cursor, sized: bool, element: Callable[[Cursor], None], name: str = "", unused: dict[str, int] | None = None
-) -> None:
-    count = cursor.count()
-    if count and unused is not None:
+def _note(unused: dict[str, int], name: str, count: int) -> None:
+    if count:
         unused[name] = count
-    if sized:
-        cursor.skip_section()
-        return
+
+
+def _skip(cursor: Cursor, element: Callable[[Cursor], None]) -> int:
+    """Skip a section, and return the number of its elements."""
+    count = cursor.count()
     for _ in range(count):
         cursor.part()
         element(cursor)
+    return count
 
 
-def _read_bodies(cursor: Cursor, sized: bool, has_markers: bool) -> tuple[RigidBody, ...]:
-    count = cursor.count()
+def _check_count(count: int) -> None:
     if count > MAX_BODIES:
         raise MessageError(f"a NatNet frame has {count} rigid bodies; at most {MAX_BODIES} are allowed")
-    extra = 0
-    if sized:  # a newer version may add fields to each body; the byte size tells how many bytes
-        cursor = cursor.section()
-        extra = cursor.left() // count - _BODY.size if count else 0
-        if extra < 0:
-            raise MessageError(f"a NatNet section of {cursor.left()} bytes announces {count} rigid bodies")
-    return _read_all(cursor, count, has_markers, extra)
 
 
-def _read_all(cursor: Cursor, count: int, has_markers: bool, extra: int = 0) -> tuple[RigidBody, ...]:
+def _sized_bodies(cursor: Cursor) -> tuple[RigidBody, ...]:
+    count, size = cursor.head()
+    _check_count(count)
+    # A newer version may add fields to each body; the size of the section tells how many bytes.
+    each = size // count if count else 0
+    if count and each < _BODY.size:
+        raise MessageError(f"a NatNet section of {size} bytes announces {count} rigid bodies")
+    bodies = _made(cursor.rows(_BODY, count, each - _BODY.size if count else 0))
+    cursor.skip(size - count * each)
+    return bodies
+
+
+def _made(rows: Iterable[tuple]) -> tuple[RigidBody, ...]:
+    return tuple(map(RigidBody._make, rows))
+
+
+def _read_bodies(cursor: Cursor, count: int, has_markers: bool) -> tuple[RigidBody, ...]:
     if has_markers:
         return tuple([_read_marked(cursor) for _ in range(count)])
-    bodies = cursor.rows(_BODY, count, extra)
-    return tuple(
-        [
-            RigidBody(id, (px, py, pz), (qx, qy, qz, qw), mean_error, params & 1 == 1)
-            for id, px, py, pz, qx, qy, qz, qw, mean_error, params in bodies
-        ]
-    )
+    return _made(cursor.rows(_BODY, count))
 
 
 def _read_marked(cursor: Cursor) -> RigidBody:
     """A body of a version before 3.0, which is followed by its markers."""
-    id, px, py, pz, qx, qy, qz, qw = cursor.unpack(_POSE_ONLY)
+    pose = cursor.unpack(_POSE_ONLY)
     cursor.part()
     cursor.skip(_MARKER * cursor.count())
-    mean_error, params = cursor.unpack(_QUALITY)
-    return RigidBody(id, (px, py, pz), (qx, qy, qz, qw), mean_error, params & 1 == 1)
+    return RigidBody(*pose, *cursor.unpack(_QUALITY))
 
 
-def _read_skeletons(cursor: Cursor, sized: bool, has_markers: bool) -> tuple[Skeleton, ...]:
-    count = cursor.count()
-    if sized:
-        cursor = cursor.section()
-    skeletons, bones_left = [], MAX_BODIES
+def _sized_skeletons(cursor: Cursor) -> tuple[Skeleton, ...]:
+    count, size = cursor.head()
+    section = cursor.cut(size)
+    skeletons: list[Skeleton] = []
+    room = MAX_BODIES
     for _ in range(count):
-        cursor.part()
-        id, bones = cursor.int32(), cursor.count()
-        if bones > bones_left:
-            if sized:
-                break  # the rest is skipped with its section
-            raise MessageError(f"a NatNet frame has more than {MAX_BODIES} bones")
-        bones_left -= bones
-        skeletons.append(Skeleton(id, _read_all(cursor, bones, has_markers)))
+        section.part()
+        id, bones = section.int32(), section.count()
+        if bones > room:
+            break  # the rest is skipped with its section
+        room -= bones
+        skeletons.append(Skeleton(id, _read_bodies(section, bones, has_markers=False)))
     return tuple(skeletons)
 
 
-def _nothing(cursor: Cursor) -> None:
-    pass
+def _plain_skeletons(cursor: Cursor, has_markers: bool) -> tuple[Skeleton, ...]:
+    skeletons: list[Skeleton] = []
+    room = MAX_BODIES
+    for _ in range(cursor.count()):
+        cursor.part()
+        id, bones = cursor.int32(), cursor.count()
+        if bones > room:
+            raise MessageError(f"a NatNet frame has more than {MAX_BODIES} bones")
+        room -= bones
+        skeletons.append(Skeleton(id, _read_bodies(cursor, bones, has_markers)))
+    return tuple(skeletons)
+
+
+def _vector(cursor: Cursor) -> None:
+    cursor.skip(_VECTOR)
+
+
+def _labelled_marker(cursor: Cursor) -> None:
+    cursor.skip(26)
+
+
+def _old_marker(cursor: Cursor) -> None:
+    cursor.skip(22)
 
 
 def _marker_set(cursor: Cursor) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from manipnet.inputs.natnet.definitions import Definitions
-from manipnet.inputs.natnet.frames import MocapFrame, RigidBody
+from manipnet.inputs.natnet.frames import MocapFrame, RigidBody, Skeleton
 
 LONGEST_ASK_S: Final = 30.0
 """The definitions are asked for at once when an unknown id arrives. If they do not name it, the pauses grow to this."""
@@ -19,6 +19,8 @@ class Names:
         """The names of the rigid bodies by their ids, as far as they are unambiguous."""
         self.conflicts: tuple[str, ...] = ()
         """What is ambiguous in the definitions."""
+        self._bones: dict[int, tuple[list[int], list[str | None]]] = {}
+        """The ids of the bones in the newest frame and their names, by the ids of the skeletons that are defined."""
         self._ids: frozenset[int] = frozenset()
         self._wanted = True
         self._unknown: set[object] = set()
@@ -36,6 +38,7 @@ class Names:
         """Take new definitions."""
         self.definitions, self._wanted = definitions, False
         self.bodies, self.conflicts = definitions.names(), tuple(definitions.conflicts())
+        self._bones.clear()
         self._ids, self._present = frozenset(id for id, _ in definitions.bodies), None
         self._tries += bool(self._unknown)
 
@@ -68,11 +71,17 @@ class Names:
 
     def bones(self, frame: MocapFrame) -> Iterator[tuple[str, RigidBody]]:
         """The bones of a frame that have a name, with their names."""
-        names = self.definitions.bones
         for skeleton in frame.skeletons:
-            if skeleton.id not in self.definitions.skeletons:
-                continue
-            for bone in skeleton.bones:
-                name = names.get((skeleton.id, bone.id & 0xFFFF))
-                if name is not None:
-                    yield name, bone
+            if skeleton.id in self.definitions.skeletons:
+                for name, bone in zip(self._names_of(skeleton), skeleton.bones, strict=True):
+                    if name is not None:
+                        yield name, bone
+
+    def _names_of(self, skeleton: Skeleton) -> list[str | None]:
+        """The names of a skeleton's bones, which are looked up only when other bones come than in the frame before."""
+        ids = [bone[0] for bone in skeleton.bones]
+        found = self._bones.get(skeleton.id)
+        if found is None or found[0] != ids:
+            names = self.definitions.bones
+            found = self._bones[skeleton.id] = ids, [names.get((skeleton.id, id & 0xFFFF)) for id in ids]
+        return found[1]

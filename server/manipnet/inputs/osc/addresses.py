@@ -4,13 +4,15 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from manipnet.inputs.osc.ignored import IgnoredAddress, IgnoredAddresses
-from manipnet.inputs.osc.packet import Argument, check_address, read_address, read_arguments
+from manipnet.inputs.osc.packet import Argument, check_address, read_address, read_arguments, read_types
 from manipnet.inputs.osc.patterns import PATTERNS, WITHOUT_BODY, Pattern, with_axes
-from manipnet.inputs.osc.reader import BodyKey, Reader, Route
+from manipnet.inputs.osc.reader import BodyKey, Content, Form, Reader
 from manipnet.wire.bodies import MessageError, check_name
 
 MOST_CACHED: Final = 2048
 """Addresses whose meaning is remembered. There are more only if a sender makes addresses up."""
+MOST_STARTS: Final = 4
+"""Heads of different sizes that are remembered for one address. The names of its bodies make them differ."""
 MOST_SKELETONS: Final = 64
 
 _Found = tuple[Reader, ...] | MessageError | IgnoredAddress
@@ -30,17 +32,35 @@ class AddressBook:
         self._patterns = [(each, each.regex()) for each in (*declared, *with_axes(PATTERNS, axes))]
         self.bodies = bodies
         self._cache: dict[bytes, _Found] = {}
+        self._forms: dict[bytes, Form] = {}
+        """How to read messages, by their heads."""
+        self._starts: dict[bytes, tuple[int, ...]] = {}
+        """The sizes of the heads, by the address."""
         self._skeletons: dict[int, str] = {}
         self.ignored = IgnoredAddresses()
         """The messages that were not understood."""
         self.without_body = IgnoredAddresses()
         """The messages that are known to hold nothing about tracked bodies."""
 
-    def read(self, message: bytes, source: str = "", now_s: float = 0.0) -> Route | None:
+    def read(self, message: bytes, source: str = "", now_s: float = 0.0) -> Content | None:
         """The content of one OSC message, or None if it holds nothing of use. Raises `MessageError`.
 
         A message whose address or form is not understood is noted in `ignored`, whatever is in it.
         """
+        for start in self._starts.get(message[: message.find(b"\0")], ()):
+            form = self._forms.get(message[:start])
+            if form is not None and form.size == len(message):
+                return form.read(message)
+        return self._read_unknown(message, source, now_s)
+
+    def name_skeleton(self, number: BodyKey, name: str) -> None:
+        """Note the name of a skeleton whose bones are sent with its number."""
+        if isinstance(number, int) and len(self._skeletons) < MOST_SKELETONS and self._skeletons.get(number) != name:
+            self._skeletons[number] = name
+            self._forget_forms()
+
+    def _read_unknown(self, message: bytes, source: str, now_s: float) -> Content | None:
+        """The content of a message that does not begin like one that was read before."""
         raw, offset = read_address(message)
         readers = self._cache.get(raw)
         if readers is None:
@@ -57,21 +77,34 @@ class AddressBook:
         error: MessageError | None = None
         for reader in readers:
             try:
-                route = reader.read(arguments)
+                route = reader.route(arguments)
+                if route is not None:
+                    content = reader.content(route, arguments)
+                    self._remember(raw, message, reader.form(route, message, read_types(message, offset)))
+                    return content
             except MessageError as wrong:
                 error = error or wrong
-            else:
-                if route is not None:
-                    return route
         if error is not None:
             raise error
         self.ignored.note(raw, _form(arguments), source, now_s)
         return None
 
-    def name_skeleton(self, number: BodyKey, name: str) -> None:
-        """Note the name of a skeleton whose bones are sent with its number."""
-        if isinstance(number, int) and len(self._skeletons) < MOST_SKELETONS:
-            self._skeletons[number] = name
+    def _remember(self, raw: bytes, message: bytes, form: Form | None) -> None:
+        """Read the messages that begin like this one by its form from now on."""
+        if form is None:
+            return
+        if len(self._forms) >= MOST_CACHED:
+            self._forget_forms()
+        starts = self._starts.get(raw, ())
+        if form.start not in starts:
+            if len(starts) >= MOST_STARTS:
+                return
+            self._starts[raw] = (*starts, form.start)
+        self._forms[message[: form.start]] = form
+
+    def _forget_forms(self) -> None:
+        self._forms.clear()
+        self._starts.clear()
 
     def _find(self, raw: bytes) -> _Found:
         if len(self._cache) >= MOST_CACHED:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from manipnet.inputs.osc.addresses import AddressBook
 from manipnet.inputs.osc.memory import REFUSED, BodyMemory, Fields
 from manipnet.inputs.osc.packet import IMMEDIATELY, Packet, time_tag_to_s
-from manipnet.inputs.osc.reader import BodyKey, Route
+from manipnet.inputs.osc.reader import BodyKey, Content
 from manipnet.inputs.sender_clock import ARRIVAL, SenderClock
 from manipnet.inputs.timecode_rate import TimecodeRate
 from manipnet.wire.bodies import MAX_BODIES, BodyFrame, BodySample, MessageError
@@ -90,74 +90,73 @@ class FrameAssembler:
 
     def add(self, packet: Packet, t_received_s: float) -> Added:
         """Take one datagram as `split_packet` returned it. A message that is wrong costs only itself."""
-        faults = packet.faults
-        routes: list[tuple[int, Route]] = []
-        for tag, message in packet.messages:
+        messages, faults = packet
+        contents: list[tuple[int, Content]] = []
+        for tag, message in messages:
             try:
-                route = self._book.read(message, self.source, t_received_s)
+                content = self._book.read(message, self.source, t_received_s)
             except MessageError as error:
                 faults.append(str(error))
             else:
-                if route is not None:
-                    routes.append((tag, route))
+                if content is not None:
+                    contents.append((tag, content))
         frames = self.flush(t_received_s)
-        if routes:
+        if contents:
             self.heard_s = t_received_s
-        refused = _same_keys(routes) if len(routes) > 2 else frozenset()
-        for time_tag, route in routes:
-            self._take(route, time_tag, t_received_s, frames)
-            if route.body in refused and route.body in self._pending.bodies:
-                self._pending.bodies[route.body][REFUSED] = True
+        for time_tag, content in contents:
+            if self._begins_next_frame(content, time_tag, contents):
+                self._close(frames)
+            self._take(content, time_tag, t_received_s, frames)
         # Some senders wrap each message in a bundle of its own, so only a bundle of several messages ends a frame.
-        if len(routes) > 1 and not self._pending.marked:
+        if len(contents) > 1 and not self._pending.marked:
             self._close(frames)
-        return Added(frames, bool(routes), faults)
+        return Added(frames, bool(contents), faults)
 
     def flush(self, now_s: float) -> list[BodyFrame]:
         """The frame that is complete because nothing has arrived for a while, if there is one."""
         frames: list[BodyFrame] = []
-        patience_s = MARKED_GAP_S if self._pending.marked else GAP_S
-        if self.pending and now_s - self._pending.touched_s > patience_s:
+        pending = self._pending
+        if pending.bodies and now_s - pending.touched_s > (MARKED_GAP_S if pending.marked else GAP_S):
             self._close(frames)
         return frames
 
-    def _take(self, route: Route, time_tag: int, now_s: float, frames: list[BodyFrame]) -> None:
-        if self._begins_next_frame(route, time_tag):
-            self._close(frames)
+    def _take(self, content: Content, time_tag: int, now_s: float, frames: list[BodyFrame]) -> None:
+        route = content.route
         pending = self._pending
         pending.touched_s = now_s
-        pending.begun_s = now_s if pending.begun_s is None else pending.begun_s
-        if time_tag > IMMEDIATELY and pending.time_tag != time_tag:
+        if pending.begun_s is None:
+            pending.begun_s = now_s
+        if pending.time_tag != time_tag > IMMEDIATELY:
             pending.time_tag = time_tag
             self._note_tag(time_tag, now_s)
         if route.field in _OF_BODY:
-            self._take_body(route)
+            self._take_body(content)
             return
         match route.field:
             case "start":
-                pending.number, pending.marked = int(route.values[0]), True
+                pending.number, pending.marked = int(content.values[0]), True
             case "end":
-                pending.number = int(route.values[0])
+                pending.number = int(content.values[0])
                 self._close(frames)
             case "ms" | "s" | "smpte":
-                self._note_time(route, now_s)
+                self._note_time(route.field, content.values[0], now_s)
             case "name":
                 self.memory.name(route.body, route.text)
             case "skeleton":
                 self._book.name_skeleton(route.body, route.text)
 
-    def _take_body(self, route: Route) -> None:
-        pending = self._pending
-        fields = pending.bodies.get(route.body)
+    def _take_body(self, content: Content) -> None:
+        bodies = self._pending.bodies
+        fields = bodies.get(content.route.body)
         if fields is None:
-            if len(pending.bodies) >= MAX_BODIES:
+            if len(bodies) >= MAX_BODIES:
                 self.incomplete += 1
                 return
-            fields = pending.bodies[route.body] = {}
-        elif pending.marked and route.field in _POSES and fields.get(route.field, route.values) != route.values:
+            fields = bodies[content.route.body] = {}
+        elif content.route.field in _POSES and fields.get(content.route.field, content.values) != content.values:
             # A datagram that arrives twice repeats its values; another value is that of another body.
             fields[REFUSED] = True
-        add_to(fields, route)
+        add_to(fields, content)
 
     def _note_tag(self, time_tag: int, now_s: float) -> None:
         clock = self.clock.clocks[0]
@@ -165,23 +164,23 @@ class FrameAssembler:
         clock.doubtful = clock.runs is None and (time_tag & 0xFFFFFFFF == 0 or time_tag >> 32 == 0)
         clock.note(time_tag_to_s(time_tag), now_s)
 
-    def _note_time(self, route: Route, now_s: float) -> None:
-        value, pending = route.values[0], self._pending
-        if route.field == "ms":
+    def _note_time(self, field: str, value: float, now_s: float) -> None:
+        pending = self._pending
+        if field == "ms":
             pending.stamp_s = value / 1_000.0
             self.clock.clocks[1].note(pending.stamp_s, now_s)
-        elif route.field == "s":
+        elif field == "s":
             pending.vmc_s = value
             self._vmc = _VmcTime(value, now_s)
             self.clock.clocks[2].note(value, now_s)
         else:
             pending.timecode = timecode_text(int(value))
 
-    def _begins_next_frame(self, route: Route, time_tag: int) -> bool:
-        """Whether a message cannot belong to the frame that is being assembled."""
-        pending = self._pending
+    def _begins_next_frame(self, content: Content, time_tag: int, contents: list[tuple[int, Content]]) -> bool:
+        """Whether a message, of those in a datagram, cannot belong to the frame that is being assembled."""
+        pending, route = self._pending, content.route
         if route.field == "start":  # a datagram that arrives twice repeats the start of the open frame
-            return not (pending.marked and pending.number == int(route.values[0]))
+            return not (pending.marked and pending.number == int(content.values[0]))
         if pending.marked:
             return False
         if pending.bodies and IMMEDIATELY not in (time_tag, pending.time_tag) and time_tag != pending.time_tag:
@@ -191,9 +190,9 @@ class FrameAssembler:
         if route.field == "s":
             return pending.vmc_s is not None
         fields = pending.bodies.get(route.body)
-        if fields is None or REFUSED in fields:
+        if fields is None or (route.field not in fields and fields.keys().isdisjoint(route.parts)):
             return False
-        return route.field in fields or any(part in fields for part in route.parts)
+        return REFUSED not in fields and route.body not in _same_keys(contents)
 
     def _close(self, frames: list[BodyFrame]) -> None:
         pending, self._pending = self._pending, _Pending()
@@ -238,24 +237,25 @@ class FrameAssembler:
         return vmc.t_s
 
 
-def add_to(fields: Fields, route: Route) -> None:
+def add_to(fields: Fields, content: Content) -> None:
     """Add what a message says about a body to the fields of that body."""
+    route, values, tracked = content
     if route.parts:
-        fields.update({part: (value,) for part, value in zip(route.parts, route.values, strict=True)})
+        fields.update({part: (value,) for part, value in zip(route.parts, values, strict=True)})
         fields["converter"] = route.converter
     else:
-        fields[route.field] = route.values
-    if route.tracked is not None:
-        fields["tracked"] = (route.tracked,)
+        fields[route.field] = values
+    if tracked is not None:
+        fields["tracked"] = (tracked,)
 
 
-def _same_keys(routes: list[tuple[int, Route]]) -> Collection[BodyKey]:
+def _same_keys(contents: list[tuple[int, Content]]) -> Collection[BodyKey]:
     """The bodies that occur in one datagram with two different poses, while others occur once: they share a key.
 
     If every body occurs as often as the others, the datagram holds several frames.
     """
-    keys = [route[:2] for _, route in routes if route[1] in _POSES]
-    if len(set(keys)) == len(keys) or min(Counter(keys).values()) > 1:
+    poses = [(route.body, route.field, values) for _, (route, values, _) in contents if route.field in _POSES]
+    counts = Counter((body, field) for body, field, _ in poses)
+    if len(contents) < 3 or len(counts) == len(poses) or min(counts.values()) > 1:
         return frozenset()
-    values = {(route.body, route.field, route.values) for _, route in routes if route.field in _POSES}
-    return {body for (body, _), count in Counter((body, field) for body, field, _ in values).items() if count > 1}
+    return {body for (body, _), count in Counter((body, field) for body, field, _ in {*poses}).items() if count > 1}

@@ -23,6 +23,8 @@ NTP_TO_UNIX_S = 2_208_988_800
 Argument = int | float | str | bytes | bool | None
 
 _BUNDLE = b"#bundle\0"
+_SLASH = ord("/")
+_SIZE = struct.Struct(">i")
 _STRUCT_OF = {"i": "i", "f": "f", "h": "q", "d": "d", "t": "Q", "r": "I", "c": "I", "m": "I"}
 _CONSTANTS: dict[str, Argument] = {"T": True, "F": False, "N": None, "I": True}
 _NUMBERS = frozenset(b"ifhd")
@@ -66,17 +68,22 @@ def _split(data: bytes, time_tag: int, depth: int, packet: Packet) -> None:
 
 
 def _split_bundle(data: bytes, time_tag: int, depth: int, packet: Packet) -> None:
-    position = 16
-    while position < len(data):
-        size = int.from_bytes(data[position : position + 4], "big", signed=True)
+    messages, faults = packet
+    position, end = 16, len(data)
+    while position < end:
+        (size,) = _SIZE.unpack_from(data, position) if position + 4 <= end else (0,)
         position += 4
-        if not 0 < size <= len(data) - position:
-            packet.faults.append(f"a bundle element has the size {size}, but {len(data) - position} bytes are left")
+        if not 0 < size <= end - position:
+            faults.append(f"a bundle element has the size {size}, but {max(end - position, 0)} bytes are left")
             return
-        if len(packet.messages) + len(packet.faults) >= MAX_MESSAGES:
-            packet.faults.append(f"the bundle has more than {MAX_MESSAGES} messages")
+        if len(messages) + len(faults) >= MAX_MESSAGES:
+            faults.append(f"the bundle has more than {MAX_MESSAGES} messages")
             return
-        _split(data[position : position + size], time_tag, depth + 1, packet)
+        element = data[position : position + size]
+        if element[0] == _SLASH and not size & 3:
+            messages.append((time_tag, element))
+        else:
+            _split(element, time_tag, depth + 1, packet)
         position += size
 
 
@@ -103,25 +110,20 @@ def read_arguments(message: bytes, offset: int, expected: Collection[object] = (
     if offset == len(message):
         return ()  # old senders omit the type tags of a message without arguments
     end, after = _text_end(message, offset, "type tag string")
-    tags = message[offset:end]
-    layout = _numbers_layout(tags)
-    if layout is not None and after + layout.size == len(message):
-        return layout.unpack_from(message, after)
-    if tags[:2] == b",s":  # a body, and its pose
-        layout = _numbers_layout(b"," + tags[2:])
-        if layout is not None:
-            end, numbers = _text_end(message, after, "text argument")
-            if numbers + layout.size == len(message) and len(tags) <= MAX_ARGUMENTS + 1:
-                return read_text(message[after:end], expected), *layout.unpack_from(message, numbers)
-    return _read_any(tags.decode("latin-1"), message, after, expected)
+    return _read_any(message[offset:end].decode("latin-1"), message, after, expected)
+
+
+def read_types(message: bytes, offset: int) -> bytes:
+    """The type tags of the arguments that `read_arguments` has read from this offset."""
+    return message[offset + 1 : max(message.find(b"\0", offset), offset + 1)]
 
 
 @lru_cache(maxsize=64)
-def _numbers_layout(tags: bytes) -> struct.Struct | None:
-    """The layout of arguments that are all numbers, as poses are, or None for other arguments."""
-    if tags[:1] != b"," or len(tags) > MAX_ARGUMENTS + 1 or not _NUMBERS.issuperset(tags[1:]):
+def numbers_layout(types: bytes) -> struct.Struct | None:
+    """The layout of arguments of these types if they are all numbers, as poses are, or None for others."""
+    if len(types) > MAX_ARGUMENTS or not _NUMBERS.issuperset(types):
         return None
-    return struct.Struct(">" + "".join(_STRUCT_OF[tag] for tag in tags[1:].decode()))
+    return struct.Struct(">" + "".join(_STRUCT_OF[type] for type in types.decode()))
 
 
 def _read_any(tags: str, message: bytes, offset: int, expected: Collection[object]) -> tuple[Argument, ...]:

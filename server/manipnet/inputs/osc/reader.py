@@ -1,10 +1,12 @@
 """Reads the arguments of an OSC message as one pattern says."""
 
 import re
-from collections.abc import Callable, Mapping
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from typing import Final, NamedTuple
 
-from manipnet.inputs.osc.packet import Argument
+from manipnet.inputs.osc.packet import Argument, numbers_layout
 from manipnet.inputs.osc.patterns import COMPONENTS, EULER, FRAME, KEYS, POSITION, QUATERNION, Pattern
 from manipnet.inputs.osc.space import Converter, Numbers
 from manipnet.wire.bodies import MAX_TIME_S, MessageError
@@ -13,9 +15,6 @@ BodyKey = int | str
 KeyOf = Callable[[Mapping[str, Argument], str], BodyKey]
 """The key of the body that the words `body`, or `skeleton` and `bone`, name in a message to some address."""
 
-MOST_KNOWN: Final = 256
-"""Texts of bodies whose keys are remembered."""
-_FLOATS: Final = {float}
 _POSE: Final = (*POSITION, *QUATERNION)
 _EULER_POSE: Final = (*POSITION, *EULER)
 _FIELDS: Final[Mapping[tuple[str, ...], str]] = {
@@ -27,23 +26,31 @@ _FIELDS: Final[Mapping[tuple[str, ...], str]] = {
     _EULER_POSE: "transformation",
 }
 _ORDER: Final = (*COMPONENTS, *FRAME)
+_POSES: Final = frozenset(("position", "quat", "transformation", "local"))
+_TIMES: Final = frozenset(("start", "end", "ms", "s", "smpte"))
 
 
 class Route(NamedTuple):
-    """The content of a message: a field of a body, or of the frame.
+    """What a message is about: a field of a body, or of the frame.
 
     The fields of a body are `position`, `quat`, `transformation`, `local`, `tracked`, `name`, and `parts`, whose values
     are the components `parts` in the sender's own frame, for `converter`. The fields of a frame are `start`, `end`,
-    `ms`, `s` and `smpte`. `tracked` is what a message says beside a pose.
+    `ms`, `s` and `smpte`.
     """
 
     body: BodyKey
     field: str
-    values: Numbers
-    tracked: float | None = None
     parts: tuple[str, ...] = ()
     converter: Converter | None = None
     text: str = ""
+
+
+class Content(NamedTuple):
+    """What a message says: the values of the field in `route`, and whether the body is `tracked`, if it says so."""
+
+    route: Route
+    values: Numbers
+    tracked: float | None = None
 
 
 class Reader:
@@ -54,24 +61,25 @@ class Reader:
         self._where, self._words, self._key_of = found.string, pattern.words, key_of
         self._literals = [(i, word[1:]) for i, word in enumerate(self._words) if word.startswith("=")]
         self._keys = [(i, word) for i, word in enumerate(self._words) if word in KEYS]
-        self._place = self._keys[0][0] if [word for _, word in self._keys] == ["body"] else None
-        """The place of the argument that alone names the body, if there is one."""
-        self._bodies: dict[Argument, BodyKey] = {}
         self._groups = {"body": pattern.body} if pattern.body else found.groupdict()
         self._body = key_of(self._groups, self._where) if self._groups and not self._keys else ""
         places = {word: i for i, word in enumerate(self._words)}
         form = tuple(sorted(places.keys() & {*_ORDER}, key=_ORDER.index))
-        self._numbers = [places[word] for word in form]
-        self._slice = _as_slice(self._numbers)
         self._tracked, self._name = places.get("tracked"), places.get("name")
         self._field = pattern.field or _FIELDS.get(form, form[0] if form and form[0] in FRAME else "parts")
+        if self._field == "tracked" and self._tracked is not None:
+            form, self._tracked = ("tracked",), None
+        self._places = [places[word] for word in form]
+        self._pick = _picker(self._places)
         self._parts = form if self._field == "parts" else ()
-        self._has_euler = EULER[0] in form and self._field != "parts"
-        self._is_plain = pattern.space.is_ours and not self._has_euler
         self._converter = pattern.space.converter()
+        self._convert = self._conversion(pattern, has_euler=EULER[0] in form)
+        deciding = [*self._keys, *self._literals, *([(self._name, "")] if self._name is not None else [])]
+        self._decided = 1 + max([i for i, _ in deciding], default=-1)
+        """The number of arguments among which are all that decide what the message is about."""
 
-    def read(self, arguments: tuple[Argument, ...]) -> Route | None:
-        """The content, or None if the arguments belong to another pattern of the address. Raises `MessageError`."""
+    def route(self, arguments: Sequence[Argument]) -> Route | None:
+        """What a message is about, or None if it belongs to another pattern of the address. Raises `MessageError`."""
         for i, literal in self._literals:
             if i >= len(arguments) or not _is_literal(arguments[i], literal):
                 return None
@@ -79,48 +87,52 @@ class Reader:
             raise MessageError(f"{self._where} has {len(arguments)} arguments; it must have {self._needed()}")
         body = self._body
         if self._keys:
-            body = self._named(arguments)
+            body = self._key_of(self._groups | {word: arguments[i] for i, word in self._keys}, self._where)
+        text = "" if self._name is None else str(arguments[self._name])
+        converter = self._converter if self._parts else None
+        return Route(body, self._field, self._parts, converter, text)
+
+    def content(self, route: Route, arguments: tuple[Argument, ...]) -> Content:
+        """What a message says about its `route`. Raises `MessageError`."""
         if self._name is not None:
-            return Route(body, self._field, (), text=str(arguments[self._name]))
-        values = arguments[self._slice] if self._slice is not None else tuple([arguments[i] for i in self._numbers])
-        if {*map(type, values)} != _FLOATS:
-            values = tuple([self._number(value) for value in values])
+            return Content(route, ())
+        values = tuple([self._number(value) for value in self._pick(arguments)])
         tracked = None if self._tracked is None else self._number(arguments[self._tracked])
-        return self._route(body, values, tracked)  # type: ignore[arg-type]
+        return Content(route, values if self._convert is None else self._convert(values), tracked)
 
-    def _named(self, arguments: tuple[Argument, ...]) -> BodyKey:
-        """The body that the arguments name."""
-        if self._place is not None:
-            known = self._bodies.get(text := arguments[self._place])
-            if known is not None and type(text) is str:
-                return known
-        given = {word: arguments[i] for i, word in self._keys}
-        body = self._key_of(self._groups | given if self._groups else given, self._where)
-        if self._place is not None and len(self._bodies) < MOST_KNOWN:
-            self._bodies[arguments[self._place]] = body
-        return body
+    def form(self, route: Route, message: bytes, types: bytes) -> "Form | None":
+        """How to read the next messages that begin as this one does, or None if that is not known beforehand.
 
-    def _route(self, body: BodyKey, values: Numbers, tracked: float | None) -> Route:
-        match self._field:
-            case "tracked":
-                return Route(body, "tracked", (tracked or 0.0,))
-            case "parts":
-                return Route(body, "parts", values, tracked, self._parts, self._converter)
-            case "start" | "end" | "ms" | "s" | "smpte":
-                if not abs(values[0]) <= 1e3 * MAX_TIME_S:
-                    raise MessageError(
-                        f"{self._where} is {values[0]}; it must be finite and at most {1e3 * MAX_TIME_S:g}"
-                    )
-            case "position" if not self._is_plain:
-                values = self._converter.position(values)
-            case "quat" if not self._is_plain:
-                values = self._turn(values)
-            case _ if not self._is_plain:
-                values = self._converter.position(values[:3]) + self._turn(values[3:])
-        return Route(body, self._field, values, tracked)
+        `types` are the type tags of the arguments.
+        """
+        types, count = types[self._decided :], len(types)
+        layout = numbers_layout(types)
+        if layout is None or count != len(self._words) or self._name is not None:
+            return None
+        picked = [place - self._decided for place in self._places]
+        pick = None if picked == list(range(len(types))) else _picker(picked)
+        tracked = None if self._tracked is None else self._tracked - self._decided
+        has_floats = {*types} <= {*b"fd"}
+        start = len(message) - layout.size
+        return Form(route, start, len(message), layout, pick, has_floats, self._convert, tracked)
 
-    def _turn(self, values: Numbers) -> Numbers:
-        return self._converter.euler(values) if self._has_euler else self._converter.rotation(values)
+    def _conversion(self, pattern: Pattern, has_euler: bool) -> Callable[[Numbers], Numbers] | None:
+        """What turns the values of the field into ours, or None if they are ours."""
+        converter, field = self._converter, self._field
+        if field in _TIMES:
+            return self._time
+        if field not in _POSES or (pattern.space.is_ours and not has_euler):
+            return None
+        if field == "position":
+            return converter.position
+        if field == "quat":
+            return converter.euler if has_euler else converter.rotation
+        return converter.euler_pose if has_euler else converter.pose
+
+    def _time(self, values: Numbers) -> Numbers:
+        if not abs(values[0]) <= 1e3 * MAX_TIME_S:
+            raise MessageError(f"{self._where} is {values[0]}; it must be finite and at most {1e3 * MAX_TIME_S:g}")
+        return values
 
     def _number(self, value: Argument) -> float:
         """A number of any type. Some senders write numbers as text."""
@@ -136,14 +148,44 @@ class Reader:
         return f"{len(words)}: {', '.join(words)}"
 
 
+class Form(NamedTuple):
+    """How to read messages that begin with the same bytes, the head, which says what they are about.
+
+    A sender repeats its messages from frame to frame, and only the numbers after the head change.
+    """
+
+    route: Route
+    start: int
+    """The size of the head in bytes."""
+    size: int
+    """The size of the message in bytes."""
+    layout: struct.Struct
+    """The numbers after the head."""
+    pick: Callable[[Numbers], Numbers] | None
+    has_floats: bool
+    convert: Callable[[Numbers], Numbers] | None
+    tracked: int | None
+
+    def read(self, message: bytes) -> Content:
+        """What the message says. Raises `MessageError`."""
+        route, start, _, layout, pick, has_floats, convert, tracked = self
+        numbers = layout.unpack_from(message, start)
+        values = numbers if pick is None else pick(numbers)
+        if not has_floats:
+            values = tuple([float(value) for value in values])
+        if convert is not None:
+            values = convert(values)
+        return Content(route, values, None if tracked is None else float(numbers[tracked]))
+
+
 def _is_literal(argument: Argument, literal: str) -> bool:
     if isinstance(argument, str):
         return argument == literal
     return literal.isdigit() and type(argument) in (int, float) and argument == int(literal)
 
 
-def _as_slice(places: list[int]) -> slice | None:
-    """The places as a slice if they are in a row, as they usually are."""
-    if places and places == list(range(places[0], places[0] + len(places))):
-        return slice(places[0], places[0] + len(places))
-    return None
+def _picker(places: list[int]) -> Callable[[tuple], tuple]:
+    """Takes the arguments at these places, which usually are in a row."""
+    if not places or places == list(range(places[0], places[-1] + 1)):
+        return itemgetter(slice(places[0], places[-1] + 1) if places else slice(0))
+    return itemgetter(*places)  # at least two

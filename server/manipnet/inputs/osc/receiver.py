@@ -64,7 +64,7 @@ class OscBodies(Receiver):
         host, port = udp.getsockname()[:2]
         self.address = f"udp://[{host}]:{port}" if ":" in host else f"udp://{host}:{port}"
         health = ReceiverHealth(self._intake.protocol, self._intake.telemetry)
-        self._thread = UdpThread(udp, lambda: self._open(port), self._receive, self._idle, self._lost, health)
+        self._thread = UdpThread(udp, lambda: self._open(port), self.receive, self._idle, self._lost, health)
         self._thread.start()
 
     def stop(self) -> None:
@@ -96,7 +96,8 @@ class OscBodies(Receiver):
         self._flood = FloodWatch(FloodFilter(udp))
         return udp
 
-    def _receive(self, datagram: bytes, sender: Address, now_s: float) -> None:
+    def receive(self, datagram: bytes, sender: Address, now_s: float) -> None:
+        """Take one datagram that `sender` has sent. Belongs to the thread of the socket."""
         if not self._rate_limiter.admits(sender, now_s):
             self._intake.drop("rate", "osc", _FLOOD)
             if self._flood is not None:

@@ -43,34 +43,47 @@ class Converter:
     """Converts positions and rotations from a `Space` to the project frame."""
 
     def __init__(self, space: Space) -> None:
-        (self._x, self._y, self._z) = read_axes(space.axes)
-        self._hand = _determinant((self._x, self._y, self._z))
-        self._unit_m, self._angle = space.unit_m, space.angle
+        axes = read_axes(space.axes)
+        hand = _determinant(axes)
+        self._metres = [(i, sign * space.unit_m) for i, sign in axes]
+        self._turns = [(i, sign * hand) for i, sign in axes]
+        self._angle = space.angle
         self._order = [_LETTERS.index(letter) for letter in space.rotation_order]
+        self._parity = _parity(*self._order)
 
     def position(self, p: Numbers) -> Numbers:
         """A position in metres, from three numbers."""
-        (i, a), (j, b), (k, c) = self._x, self._y, self._z
-        unit_m = self._unit_m
-        return a * unit_m * p[i], b * unit_m * p[j], c * unit_m * p[k]
+        (i, a), (j, b), (k, c) = self._metres
+        return a * p[i], b * p[j], c * p[k]
 
     def rotation(self, q: Numbers) -> Numbers:
         """A quaternion x y z w. The axis of a rotation changes its sign when axes of the other hand are mirrored."""
-        (i, a), (j, b), (k, c) = self._x, self._y, self._z
-        hand = self._hand
-        return hand * a * q[i], hand * b * q[j], hand * c * q[k], q[3]
+        (i, a), (j, b), (k, c) = self._turns
+        return a * q[i], b * q[j], c * q[k], q[3]
+
+    def pose(self, pose: Numbers) -> Numbers:
+        """A position in metres and a quaternion x y z w, from seven numbers."""
+        (i, a), (j, b), (k, c) = self._metres
+        (_, d), (_, e), (_, f) = self._turns
+        return a * pose[i], b * pose[j], c * pose[k], d * pose[i + 3], e * pose[j + 3], f * pose[k + 3], pose[6]
+
+    def euler_pose(self, pose: Numbers) -> Numbers:
+        """A position in metres and a quaternion x y z w, from a position and three angles."""
+        return self.position(pose) + self.euler(pose[3:])
 
     def euler(self, angles: Numbers) -> Numbers:
         """A quaternion x y z w from the angles about the sender's x, y and z axes."""
         if not all(map(math.isfinite, angles)):
             return _NAN
-        q = (0.0, 0.0, 0.0, 1.0)
-        for axis in self._order:
-            half = 0.5 * self._angle * angles[axis]
-            turn = [0.0, 0.0, 0.0, math.cos(half)]
-            turn[axis] = math.sin(half)
-            q = _times(turn, q)
-        return self.rotation(q)
+        i, j, k = self._order  # the first, the second and the third turn, whose quaternions are multiplied
+        a, b, c = (0.5 * self._angle * angles[axis] for axis in self._order)
+        sa, ca, sb, cb, sc, cc = math.sin(a), math.cos(a), math.sin(b), math.cos(b), math.sin(c), math.cos(c)
+        even = self._parity
+        q = [0.0, 0.0, 0.0, ca * cb * cc + even * sa * sb * sc]
+        q[i] = sa * cb * cc - even * ca * sb * sc
+        q[j] = ca * sb * cc + even * sa * cb * sc
+        q[k] = ca * cb * sc - even * sa * sb * cc
+        return self.rotation(tuple(q))
 
 
 def read_axes(text: str) -> tuple[tuple[int, float], tuple[int, float], tuple[int, float]]:
@@ -84,17 +97,9 @@ def read_axes(text: str) -> tuple[tuple[int, float], tuple[int, float], tuple[in
 
 def _determinant(rows: tuple[tuple[int, float], ...]) -> float:
     (i, a), (j, b), (k, c) = rows
-    even = (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-    return a * b * c * (1.0 if even else -1.0)
+    return a * b * c * _parity(i, j, k)
 
 
-def _times(a: list[float], b: Numbers) -> Numbers:
-    """The product of two quaternions x y z w: first `b`, then `a`."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
+def _parity(i: int, j: int, k: int) -> float:
+    """1 for an even permutation of 0, 1 and 2, and -1 for an odd one."""
+    return 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0

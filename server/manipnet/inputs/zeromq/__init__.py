@@ -37,7 +37,7 @@ ZEROMQ = Input(
     "ZeroMQ: the sender's PUB socket connects",
     ZmqInputOptions,
     _open,
-    drop_reasons=("malformed", "oversized", "rate"),
+    drop_reasons=("malformed", "oversized", "rate", "backlog"),
     transport="tcp",
     ready_name="bodies",
     scheme="tcp",

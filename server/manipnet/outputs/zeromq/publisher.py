@@ -9,10 +9,14 @@ from manipnet.net.supervised import Pauses, ReceiverHealth
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
 from manipnet.telemetry import Telemetry
-from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK
+from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, hand_topics
 
 MAX_SUBSCRIPTION_BYTES = 1024
 """Subscriptions, and the handshake of CURVE, are all that clients send."""
+MAX_SUBSCRIPTIONS = 4096
+"""Prefixes of topics that are remembered; beyond them, nobody's subscription to an avatar is noticed."""
+READ_AT_ONCE = 256
+"""Subscriptions that are read at one call."""
 
 
 class ZmqPublisher(HandsOutput):
@@ -25,6 +29,8 @@ class ZmqPublisher(HandsOutput):
         self.address = self._bound.address
         self._health, self._pauses = ReceiverHealth("hands", telemetry), Pauses()
         self._pauses.opened()
+        self._subscribed: set[bytes] = set()
+        """The prefixes of topics that clients have subscribed to."""
         self._retry_s: float | None = None
         """When the socket, which has failed, is opened again."""
 
@@ -32,6 +38,7 @@ class ZmqPublisher(HandsOutput):
         """Publish one message under both topics; False while the socket has failed and is not open again yet."""
         if self._retry_s is not None and not self._reopened():
             return False
+        self._read_subscriptions()
         try:
             self._bound.socket.send(TOPIC_MSGPACK + hands.msgpack)
             self._bound.socket.send(TOPIC_BIN + hands.binary)
@@ -40,6 +47,40 @@ class ZmqPublisher(HandsOutput):
             self._fail(error)
             return False
         return True
+
+    def wants(self, avatar: str) -> bool:
+        """Whether a client has subscribed to a topic of the avatar, or to a prefix of it."""
+        self._read_subscriptions()
+        topics = hand_topics(avatar)
+        return any(topic.startswith(prefix) for prefix in self._subscribed for topic in topics)
+
+    def send_avatar(self, hands: EncodedHands) -> None:
+        """Publish the hands of an avatar under both of its topics."""
+        if self._retry_s is not None:
+            return
+        try:
+            for topic, payload in zip(hand_topics(str(hands.message.hand)), (hands.msgpack, hands.binary), strict=True):
+                self._bound.socket.send(topic + payload)
+        except zmq.ZMQError as error:
+            self._bound.close()
+            self._fail(error)
+
+    def _read_subscriptions(self) -> None:
+        """Note what clients have subscribed to since the last call, and what none of them subscribes to any longer."""
+        if self._retry_s is not None:
+            return
+        try:
+            for _ in range(READ_AT_ONCE):
+                message = self._bound.socket.recv(zmq.NOBLOCK)
+                if message[:1] == b"\x01" and len(self._subscribed) < MAX_SUBSCRIPTIONS:
+                    self._subscribed.add(message[1:])
+                elif message[:1] == b"\x00":
+                    self._subscribed.discard(message[1:])
+        except zmq.Again:
+            pass
+        except zmq.ZMQError as error:
+            self._bound.close()
+            self._fail(error)
 
     def connected(self) -> int:
         """The number of clients that are connected. From any thread."""
@@ -50,10 +91,11 @@ class ZmqPublisher(HandsOutput):
         self._bound.close()
 
     def _bind(self, port: int) -> BoundSocket:
-        return BoundSocket(zmq.PUB, self._host, port, self._telemetry, self._keys, MAX_SUBSCRIPTION_BYTES)
+        return BoundSocket(zmq.XPUB, self._host, port, self._telemetry, self._keys, MAX_SUBSCRIPTION_BYTES)
 
     def _fail(self, error: Exception) -> None:
         self._health.down(error)
+        self._subscribed.clear()
         self._retry_s = time.monotonic() + self._pauses.next_s()
 
     def _reopened(self) -> bool:

@@ -10,6 +10,9 @@ FEW: Final = 0.02
 HARMLESS: Final = ("duplicate", "late", "time_jump", "other_sender", "jump", "zeros")
 """Reasons that are normal at times: when a sender restarts, or when a datagram arrives twice."""
 
+BACKLOG: Final = "backlog"
+"""What was sent while the server was not running and arrived when it had started; that is over at once."""
+
 _REMEDIES: Final = {
     "oversized": "send one frame per message, with at most 64 KiB and 256 bodies",
     "unsupported": "update Motive, or this program",
@@ -63,9 +66,11 @@ def of_drops(report: Report) -> Iterator[Finding]:
             line = report.get("log", {}).get(reason, "")
             text = f"{what} as {reason}: {drop['count']} so far, {drop['rate_hz']:.0f} per second, the newest "
             text += ago(drop["age_s"]) + (f"; {line}" if line else "")
+            if reason == BACKLOG:
+                text += "; they were sent before the server listened, and do not say when they were captured"
             is_normal = reason in HARMLESS and (drop["rate_hz"] <= FEW * frames_hz or drop["count"] < 10)
             # Some senders send each body in a frame of its own, and other bodies than those of the rig.
-            is_normal = is_normal or (reason == "unknown_body" and has_live_bodies)
+            is_normal = is_normal or (reason == "unknown_body" and has_live_bodies) or reason == BACKLOG
             if drop["age_s"] > RECENT_S or is_normal:
                 yield Finding("note", text)
             else:

@@ -1,8 +1,9 @@
 """What a hand remembers of its grip, and how that changes from tick to tick.
 
 A finger of a hand that holds an object either follows the network or has a pose of its own, which was chosen because it
-carries (`holding`). It goes to that pose, and later back to the network's, like a critically damped spring. A fingertip
-that touches what the hand holds has an anchor on the object, so that it does not slide.
+carries (`holding`). It goes to that pose, and later back to the network's, like a critically damped spring. While the
+contacts carry more than they must, its pose eases toward the network's. A fingertip that touches what the hand holds
+has an anchor on the object, so that it does not slide.
 """
 
 from typing import NamedTuple
@@ -13,9 +14,9 @@ from manipnet.synthesis.hand.hand import CHAIN_LENGTH, Chains
 from manipnet.synthesis.ik.chains import Surface
 from manipnet.synthesis.sensing.scene import map_point
 
-HELD_TICKS, NEXT_FINGER, FAILED_TICKS = 0, 1, 2
+HELD_TICKS, NEXT_FINGER, FAILED_TICKS, FAILURES, EASES, LAY_BEFORE, LAY_AT_M = 0, 1, 2, 3, 4, 5, 6
 """Entries of `Grip.hand`."""
-_HAND = 3
+_HAND = 7
 ANCHOR = 4
 """Numbers of an anchor."""
 ARRIVING_TICKS = 14
@@ -33,8 +34,10 @@ class Grip(NamedTuple):
     """The memory of one hand."""
 
     hand: Array
-    """`(3,)`: for how long it has held the object, which finger is looked at next, for how long the object has not
-    been carried; in ticks."""
+    """`(7,)`: for how many ticks it has held the object, which finger is looked at next, for how many ticks the object
+    has not been carried, how often that happened in this hold, what share of the way its fingers eased toward the
+    network's pose at the last tick, whether the object ever lay without a hand, and how high its lowest point was then,
+    metres."""
     ages: Array
     """`(F,)` ticks since a finger was given a pose of its own; 0 for a finger that follows the network."""
     weights: Array
@@ -94,6 +97,25 @@ def move_finger(chains: Chains, finger: int, predicted: Array, grip: Grip):
             pull = _PACE * (wanted - grip.offsets[angle]) - 2.0 * grip.speeds[angle]
             grip.speeds[angle] += _PACE * pull
             grip.offsets[angle] += grip.speeds[angle]
+
+
+@inner
+def ease_fingers(chains: Chains, share: float, predicted: Array, grip: Grip):
+    """Move the poses of fingers that have arrived a `share` of the way to the network's, `predicted (A,)`.
+
+    When the share becomes zero, a finger stays where it is at that moment.
+    """
+    stops = share == 0.0 and grip.hand[EASES] > 0.0
+    grip.hand[EASES] = share
+    for finger in range(len(chains.angles)):
+        if grip.ages[finger] <= ARRIVING_TICKS:
+            continue
+        for k in range(CHAIN_LENGTH):
+            angle = chains.angles[finger, k]
+            if angle >= 0 and stops:
+                grip.poses[angle] = predicted[angle] + grip.offsets[angle]
+            elif angle >= 0:
+                grip.poses[angle] += share * (predicted[angle] - grip.poses[angle])
 
 
 @inner

@@ -23,6 +23,8 @@ PUSHED_ASIDE = 0.2
 """Share of its weight by which the object is pushed to each of four sides."""
 ENOUGH_M_S2 = 0.08 * GRAVITY_M_S2
 """What may be left of the weight, per unit of mass."""
+SPARE_M_S2 = 0.5 * ENOUGH_M_S2
+"""If no more than this is left, the contacts carry with some to spare."""
 TAKEN_TICKS = 14
 """The confidence looks a quarter of a second ahead, so a hand that takes an object has these ticks to close."""
 
@@ -158,7 +160,7 @@ def _left(work: Work, count: int, x: float, z: float):
     for i in range(3):
         up, across, along = work.directions[0, i], work.directions[1, i], work.directions[2, i]
         work.wanted[i], work.wanted[3 + i] = GRAVITY_M_S2 * (up + x * across + z * along), 0.0
-    return unexplained(work.columns, count, work.wanted, 0.5 * ENOUGH_M_S2)
+    return unexplained(work.columns, count, work.wanted, SPARE_M_S2)
 
 
 @inner

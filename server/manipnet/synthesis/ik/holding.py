@@ -2,23 +2,25 @@
 
 A hand that moves with an object holds it. The contacts of all hands that hold it must be able to carry its weight, also
 when it is pushed aside a little. Where they cannot, one finger a tick gets the nearest pose that helps most, first near
-its present pose and then over its whole range. It keeps that pose until the hand lets go.
+its present pose and then over its whole range. While the contacts carry with some to spare, that pose eases toward the
+network's; it is given up when the hand lets go. An object that lies where it lay before needs no hand to carry it.
 """
 
 import numpy as np
 
-from manipnet.geometry import Array
 from manipnet.jit import inner, matrix, stack_array
 from manipnet.synthesis.hand.hand import CHAIN_LENGTH, MAX_ANGLES, MAX_CAPSULES, MAX_JOINTS
 from manipnet.synthesis.hand.kinematics import pose_finger_into
 from manipnet.synthesis.ik.contacts import CONTACT, EDGES, TOUCH_M, add_wrenches, find_contact
 from manipnet.synthesis.ik.finger_poses import MOST_POSES, touching_poses
-from manipnet.synthesis.ik.grasp import ARM_M, finger_clearance, grasp_confidence
+from manipnet.synthesis.ik.grasp import finger_clearance, grasp_confidence
 from manipnet.synthesis.ik.grip import (
     ARRIVING_TICKS,
     FAILED_TICKS,
+    FAILURES,
     HELD_TICKS,
     NEXT_FINGER,
+    ease_fingers,
     loosen_anchor,
     move_finger,
     take_pose,
@@ -27,6 +29,7 @@ from manipnet.synthesis.ik.grip import (
 from manipnet.synthesis.ik.holders import (
     ENOUGH_M_S2,
     MOST_HANDS,
+    SPARE_M_S2,
     Hands,
     Work,
     add_hand,
@@ -40,6 +43,7 @@ from manipnet.synthesis.ik.holders import (
 )
 from manipnet.synthesis.ik.nnls import SIZE
 from manipnet.synthesis.ik.overlap import finger_overlap
+from manipnet.synthesis.ik.support import lies, moved
 from manipnet.synthesis.model.layout import PRESENT
 
 TAKES, LEAVES = 0.5, 0.1
@@ -48,6 +52,9 @@ LEAVES_M = 0.012
 """A finger that is predicted to be farther than this from the object lets go."""
 PATIENCE_TICKS = 5
 """A grip that carries the weight but not a push may be that short of it for this long."""
+EASE, EASES_FREELY = 0.05, 6
+"""Share of the way to the network's pose that a finger with a pose of its own goes per tick while nothing needs it; it
+is halved with every failure of the hold beyond this number, so that a hold comes to rest."""
 BETTER_M_S2, POSTURE_M_S2 = 0.2, 4.0
 """What a new pose must improve; what a square radian of change costs."""
 OVERLAP_M, OVERLAP_S2 = 0.006, 60.0
@@ -110,7 +117,7 @@ def _remember(hands: Hands, n: int):
     if confidence > TAKES:
         grip.hand[HELD_TICKS] += 1.0
     elif confidence < LEAVES and nearest > LEAVES_M:
-        grip.hand[HELD_TICKS] = 0.0
+        grip.hand[HELD_TICKS] = grip.hand[FAILURES] = 0.0
     held = grip.hand[HELD_TICKS] > 0.0
     for finger in range(fingers):
         if not held:
@@ -121,39 +128,34 @@ def _remember(hands: Hands, n: int):
 
 
 @inner
-def _moved(obj: Array, start: int, stop: int):
-    """How far an object moves between two samples of its window `(21, 7)`, metres, turning included."""
-    far = near = turned = 0.0
-    for i in range(7):
-        apart = (obj[stop, i] - obj[start, i]) ** 2
-        if i < 3:
-            far += apart
-        else:
-            near += apart
-            turned += (obj[stop, i] + obj[start, i]) ** 2
-    return np.sqrt(far) + 2.0 * ARM_M * np.sqrt(min(near, turned))
-
-
-@inner
 def _look_after(hands: Hands, first: int, work: Work):
-    """Improve the grip on the object of hand `first` by one finger, if its holders do not carry it."""
+    """Improve the grip on the object of hand `first` by one finger, if nothing carries it."""
     holders = find_holders(hands, first, work)
+    set_directions(hands.windows, first, work.directions)
+    lying = lies(hands, first)
     if holders == 0:
         return
     count = 0
     for h in range(holders):
         find_contacts(hands, h, work)
         count = add_hand(hands, h, -1, work, count)
-    set_directions(hands.windows, first, work.directions)
     worst, plain = left_at_worst(work, count)
     leader = hands.grips[int(work.numbers[0])]
-    if worst <= ENOUGH_M_S2:
+    before = leader[FAILED_TICKS]
+    if lying or worst <= ENOUGH_M_S2:
         leader[FAILED_TICKS] = 0.0
-        return
-    leader[FAILED_TICKS] += 1.0 if plain <= ENOUGH_M_S2 else PATIENCE_TICKS
+    else:
+        leader[FAILED_TICKS] += 1.0 if plain <= ENOUGH_M_S2 else PATIENCE_TICKS
+    failed = leader[FAILED_TICKS] >= PATIENCE_TICKS
+    leader[FAILURES] += 1.0 if failed and before < PATIENCE_TICKS else 0.0
+    carries_more = lying or worst <= SPARE_M_S2
+    eases = EASE * 0.5 ** max(leader[FAILURES] - EASES_FREELY, 0.0) if carries_more else 0.0
+    for h in range(holders):
+        n = int(work.numbers[h])
+        ease_fingers(hands.chains, eases, hands.predicted[n], unpack_grip(hands.grips[n], len(hands.chains.angles)))
     obj = hands.windows.object[first]
-    put_down = _moved(obj, PRESENT, PRESENT + _STEPS) < _STOPPED_M and _moved(obj, PRESENT - _STEPS, PRESENT) > _CAME_M
-    if put_down or leader[FAILED_TICKS] < PATIENCE_TICKS:
+    put_down = moved(obj, PRESENT, PRESENT + _STEPS) < _STOPPED_M and moved(obj, PRESENT - _STEPS, PRESENT) > _CAME_M
+    if put_down or not failed:
         return
     # the fingers in turn, each first near its present pose; in the next round each over its whole range
     fingers = len(hands.chains.angles)

@@ -282,3 +282,34 @@ def trace_ray(bvh: Bvh, ox: float, oy: float, oz: float, dx: float, dy: float, d
             if u >= 0.0 and v >= 0.0 and u + v <= 1.0 and 0.0 <= hit < best:
                 best, triangle = hit, f
     return best, triangle
+
+
+@inner
+def _box_along(box: Array, x: float, y: float, z: float):
+    """The least that a point of a box `(6,)` can reach along a direction."""
+    at = x * (box[0] if x > 0.0 else box[3]) + y * (box[1] if y > 0.0 else box[4])
+    return at + z * (box[2] if z > 0.0 else box[5])
+
+
+@inner
+def least_along(bvh: Bvh, direction: Array):
+    """The least component of a corner along `direction (3,)`, metres, by a walk down the tree, nearest boxes first."""
+    x, y, z = direction[0], direction[1], direction[2]
+    least, nodes, waiting = np.inf, _nodes(), 1
+    nodes[0] = 0
+    while waiting > 0:
+        waiting -= 1
+        node = nodes[waiting]
+        if _box_along(bvh.boxes[node], x, y, z) >= least:
+            continue
+        start, count = bvh.links[node]
+        for triangle in range(start, start + count):
+            for k in range(3):
+                corner = bvh.corners[triangle, k]
+                least = min(least, x * corner[0] + y * corner[1] + z * corner[2])
+        if count == 0:
+            left, right = start, start + 1
+            nearer = _box_along(bvh.boxes[left], x, y, z) < _box_along(bvh.boxes[right], x, y, z)
+            nodes[waiting], nodes[waiting + 1] = (right, left) if nearer else (left, right)
+            waiting += 2
+    return least

@@ -7,6 +7,7 @@ that changes the surface and is not read here is named in the error. Source: the
 
 import json
 import struct
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -79,6 +80,43 @@ def _check_extensions(document: dict[str, Any]) -> None:
         raise GlbError(f"requires the extension {unknown[0]}, which cannot be read; export it without this extension")
 
 
+@dataclass(frozen=True)
+class GlbRig:
+    """The nodes of a file and its skinned vertices, in the pose of the file, in metres."""
+
+    names: list[str]
+    """Of the nodes; those that a VRM file maps to a humanoid have the humanoid's names."""
+    parents: list[int]
+    """The parent of each node, -1 for a root."""
+    positions: NDArray[np.float64]
+    """`(N, 3)`"""
+    vertices: NDArray[np.float64]
+    """`(V, 3)`"""
+    owners: NDArray[np.int64]
+    """`(V,)` the node that moves each vertex most."""
+
+
+def read_glb_rig(data: bytes) -> GlbRig:
+    """The skeleton of a glTF Binary or VRM file. Raises `GlbError`."""
+    document, binary = _chunks(data)
+    try:
+        return _Scene(document, binary).rig()
+    except GlbError:
+        raise
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
+        raise GlbError(f"is a damaged glTF file ({type(error).__name__}: {error}); export it again") from None
+
+
+def _humanoid_names(document: dict[str, Any]) -> dict[int, str]:
+    """The names that a VRM file, 0 or 1, gives to nodes."""
+    extensions = document.get("extensions", {})
+    if "VRMC_vrm" in extensions:
+        bones = extensions["VRMC_vrm"]["humanoid"]["humanBones"]
+        return {int(bone["node"]): str(name) for name, bone in bones.items()}
+    bones = extensions.get("VRM", {}).get("humanoid", {}).get("humanBones", [])
+    return {int(bone["node"]): str(bone["bone"]) for bone in bones}
+
+
 class _Scene:
     """The nodes of a document."""
 
@@ -104,6 +142,27 @@ class _Scene:
         if sum(map(len, faces)) == 0:
             raise GlbError("holds no triangles; export the surface, not points, curves or an empty scene")
         return np.concatenate(vertices), np.concatenate(faces)
+
+    def rig(self) -> GlbRig:
+        """The nodes and the skinned vertices."""
+        humanoid = _humanoid_names(self._document)
+        names = [humanoid.get(n, str(node.get("name", n))) for n, node in enumerate(self._nodes)]
+        positions = np.array([self._world(n)[:3, 3] for n in range(len(self._nodes))]).reshape(-1, 3)
+        vertices, owners = [np.empty((0, 3))], [np.empty(0, np.int64)]
+        for n, node in enumerate(self._nodes):
+            if "skin" not in node or "mesh" not in node:
+                continue
+            joints = np.array(self._document["skins"][node["skin"]]["joints"], np.int64)
+            for primitive in self._document["meshes"][node["mesh"]]["primitives"]:
+                attributes = primitive["attributes"]
+                if "JOINTS_0" not in attributes or (part := self._primitive(n, primitive, [])) is None:
+                    continue
+                numbers = self._accessors.read(attributes["JOINTS_0"], 4).astype(np.int64)
+                most = self._accessors.read(attributes["WEIGHTS_0"], 4).argmax(axis=1)
+                vertices.append(part[0])
+                owners.append(joints[np.take_along_axis(numbers, most[:, None], axis=1)[:, 0]])
+        parents = [self._parents.get(n, -1) for n in range(len(self._nodes))]
+        return GlbRig(names, parents, positions, np.concatenate(vertices), np.concatenate(owners))
 
     def _visible(self) -> list[int]:
         """The nodes of the scene in order, without those that are hidden."""

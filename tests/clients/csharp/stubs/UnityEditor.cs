@@ -11,7 +11,60 @@ namespace UnityEditor
         public void Repaint() { }
     }
 
-    public sealed class MenuItem : Attribute { public MenuItem(string path) { } }
+    public sealed class MenuItem : Attribute
+    {
+        public MenuItem(string itemName) { }
+        public MenuItem(string itemName, bool isValidateFunction, int priority) { }
+    }
+
+    public sealed class MenuCommand { public UnityEngine.Object context; }
+
+    public static class EditorApplication { public static bool isPlaying { get; set; } }
+
+    public static class GameObjectUtility
+    {
+        public static void SetParentAndAlign(GameObject child, GameObject parent) { }
+    }
+
+    /// <summary>Recorded holds what was told about changes.</summary>
+    public static class PrefabUtility
+    {
+        public static readonly List<UnityEngine.Object> Recorded = new List<UnityEngine.Object>();
+        public static void RecordPrefabInstancePropertyModifications(UnityEngine.Object targetObject) { Recorded.Add(targetObject); }
+        public static GameObject SaveAsPrefabAssetAndConnect(GameObject instanceRoot, string assetPath, InteractionMode action)
+        {
+            AssetDatabase.Created.Add(assetPath);
+            return instanceRoot;
+        }
+    }
+
+    public enum InteractionMode { AutomatedAction, UserAction }
+
+    public static class AssetDatabase
+    {
+        public static readonly List<string> Created = new List<string>();
+        public static string GenerateUniqueAssetPath(string path) { return path; }
+        public static void CreateAsset(UnityEngine.Object asset, string path) { Created.Add(path); }
+        public static void SaveAssets() { }
+    }
+
+    public struct EditorCurveBinding
+    {
+        public string path, propertyName;
+        public Type type;
+        public static EditorCurveBinding FloatCurve(string inPath, Type inType, string inPropertyName)
+        {
+            return new EditorCurveBinding { path = inPath, type = inType, propertyName = inPropertyName };
+        }
+    }
+
+    public static class AnimationUtility
+    {
+        public static readonly List<EditorCurveBinding> Curves = new List<EditorCurveBinding>();
+        public static readonly List<AnimationEvent> Events = new List<AnimationEvent>();
+        public static void SetEditorCurve(AnimationClip clip, EditorCurveBinding binding, AnimationCurve curve) { Curves.Add(binding); }
+        public static void SetAnimationEvents(AnimationClip clip, AnimationEvent[] events) { Events.AddRange(events); }
+    }
 
     public enum MessageType { Info }
 
@@ -53,6 +106,9 @@ namespace UnityEditor
 
     public static class Undo
     {
+        public static readonly List<UnityEngine.Object> Recorded = new List<UnityEngine.Object>();
+        public static void RecordObject(UnityEngine.Object objectToUndo, string name) { Recorded.Add(objectToUndo); }
+        public static void RegisterCreatedObjectUndo(UnityEngine.Object objectToUndo, string name) { Recorded.Add(objectToUndo); }
         public static T AddComponent<T>(GameObject to) where T : Component, new() { return to.AddComponent<T>(); }
     }
 }

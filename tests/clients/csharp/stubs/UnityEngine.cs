@@ -9,6 +9,8 @@ namespace UnityEngine
     {
         public float x, y, z;
         public Vector3(float x, float y, float z) { this.x = x; this.y = y; this.z = z; }
+        public static Vector3 zero { get { return new Vector3(0, 0, 0); } }
+        public static Vector3 Scale(Vector3 a, Vector3 b) { return new Vector3(a.x * b.x, a.y * b.y, a.z * b.z); }
         public static Vector3 one { get { return new Vector3(1, 1, 1); } }
         public static Vector3 down { get { return new Vector3(0, -1, 0); } }
         public static Vector3 operator +(Vector3 a, Vector3 b) { return new Vector3(a.x + b.x, a.y + b.y, a.z + b.z); }
@@ -58,7 +60,10 @@ namespace UnityEngine
         public override string name { get { return gameObject.name; } set { gameObject.name = value; } }
         public Transform transform { get { return gameObject.transform; } }
         public T GetComponent<T>() where T : Component { return gameObject.GetComponent<T>(); }
-        public T[] GetComponentsInChildren<T>(bool inactive) where T : Component { return transform.All().OfType<T>().ToArray(); }
+        public T[] GetComponentsInChildren<T>(bool inactive) where T : Component
+        {
+            return transform.All().SelectMany(t => t.gameObject.GetComponents<T>()).ToArray();
+        }
     }
 
     public class Behaviour : Component
@@ -75,7 +80,10 @@ namespace UnityEngine
         Transform _parent;
         Vector3 _local;
         Quaternion _turn = Quaternion.identity;
-        public Vector3 localScale;
+        public Vector3 localScale = Vector3.one;
+        public Transform parent { get { return _parent; } }
+        public Vector3 localPosition { get { return _local; } set { _local = value; } }
+        public Quaternion localRotation { get { return _turn; } set { _turn = value; } }
         public int childCount { get { return _children.Count; } }
         public Transform GetChild(int i) { return _children[i]; }
         public void SetParent(Transform parent, bool keepWorld) { _parent = parent; parent._children.Add(this); }
@@ -106,23 +114,118 @@ namespace UnityEngine
             Everything.Add(made);
             return made;
         }
+        public T[] GetComponents<T>() { return _components.OfType<T>().ToArray(); }
+        public bool activeSelf = true;
+        public void SetActive(bool active) { activeSelf = active; }
         public static GameObject CreatePrimitive(PrimitiveType type) { return new GameObject(type.ToString()); }
     }
 
-    public enum PrimitiveType { Sphere }
+    public enum PrimitiveType { Sphere = 0, Cube = 3 }
 
-    public enum HumanBodyBones { LeftHand = 17, RightHand = 18, LeftThumbProximal = 24, RightThumbProximal = 39 }
+    public enum HumanBodyBones
+    {
+        LeftUpperArm = 13, RightUpperArm = 14, LeftLowerArm = 15, RightLowerArm = 16, LeftHand = 17, RightHand = 18,
+        LeftThumbProximal = 24, RightThumbProximal = 39,
+    }
+
+    public sealed class TextAsset : Object
+    {
+        public TextAsset(string text) { this.text = text; }
+        public string text { get; private set; }
+    }
+
+    public struct SkeletonBone
+    {
+        public string name;
+        public Vector3 position;
+        public Quaternion rotation;
+        public Vector3 scale;
+    }
+
+    public struct HumanDescription { public SkeletonBone[] skeleton; }
+
+    public class Avatar : Object { public HumanDescription humanDescription { get; set; } }
+
+    public struct HumanPose { public float[] muscles; }
+
+    public class HumanPoseHandler : IDisposable
+    {
+        public HumanPoseHandler(Avatar avatar, Transform root) { }
+        public void GetHumanPose(ref HumanPose pose) { pose.muscles = Enumerable.Range(0, 95).Select(i => 0.01f * i).ToArray(); }
+        public void Dispose() { }
+    }
+
+    /// <summary>The names of the fingers' muscles have the places that they have in Unity.</summary>
+    public static class HumanTrait
+    {
+        public static string[] MuscleName
+        {
+            get
+            {
+                var names = new string[95];
+                string[] parts = { "1 Stretched", "Spread", "2 Stretched", "3 Stretched" };
+                for (int i = 0; i < 40; i++)
+                    names[55 + i] = (i < 20 ? "Left " : "Right ") + new[] { "Thumb", "Index", "Middle", "Ring", "Little" }[i % 20 / 4] + " " + parts[i % 4];
+                return names;
+            }
+        }
+    }
+
+    public struct Keyframe { public float time, value; }
+
+    public class AnimationCurve
+    {
+        readonly List<Keyframe> _keys = new List<Keyframe>();
+        public int AddKey(float time, float value)
+        {
+            _keys.Add(new Keyframe { time = time, value = value });
+            return _keys.Count - 1;
+        }
+        public int length { get { return _keys.Count; } }
+        public Keyframe this[int index] { get { return _keys[index]; } }
+    }
+
+    public enum SendMessageOptions { RequireReceiver, DontRequireReceiver }
+
+    public sealed class AnimationEvent
+    {
+        public float time { get; set; }
+        public string functionName { get; set; }
+        public string stringParameter { get; set; }
+        public float floatParameter { get; set; }
+        public SendMessageOptions messageOptions { get; set; }
+    }
+
+    public sealed class AnimationClip : Object { public float frameRate { get; set; } }
+
+    public static class Time { public static float deltaTime { get { return 1f / 60f; } } }
+
+    public struct Pose
+    {
+        public Vector3 position;
+        public Quaternion rotation;
+        public Pose(Vector3 position, Quaternion rotation) { this.position = position; this.rotation = rotation; }
+    }
+
+    public enum RuntimeInitializeLoadType { AfterSceneLoad, SubsystemRegistration }
+
+    public sealed class RuntimeInitializeOnLoadMethodAttribute : Attribute
+    {
+        public RuntimeInitializeOnLoadMethodAttribute(RuntimeInitializeLoadType type) { }
+    }
 
     public sealed class Animator : Behaviour
     {
         public readonly Dictionary<HumanBodyBones, Transform> Bones = new Dictionary<HumanBodyBones, Transform>();
+        public Avatar avatar { get; set; }
         public bool isHuman { get { return Bones.Count > 0; } }
         public Transform GetBoneTransform(HumanBodyBones bone) { Transform t; Bones.TryGetValue(bone, out t); return t; }
     }
 
     public static class Debug
     {
-        public static void LogError(string message, Object about) { Console.WriteLine("error: " + message); }
+        public static void LogError(object message, Object about) { Console.WriteLine("error: " + message); }
+        public static void LogWarning(object message, Object about) { Console.WriteLine("warning: " + message); }
     }
 
     public static class Resources

@@ -30,6 +30,12 @@ namespace ManipNet.Client
             return true;
         }
 
+        public void Clear()
+        {
+            Length = 0;
+            _text = "";
+        }
+
         public void CopyFrom(FixedName other)
         {
             if (Same(other._bytes, 0, other.Length)) return;

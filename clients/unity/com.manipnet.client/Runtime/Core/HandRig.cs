@@ -11,8 +11,6 @@ namespace ManipNet.Client
         public const int BoneCount = 15;
         public static readonly string[] Fingers = { "Thumb", "Index", "Middle", "Ring", "Little" };
         public static readonly string[] Parts = { "Proximal", "Intermediate", "Distal" };
-        const int Index = 3, Middle = 6, Little = 12;
-        const int IndexJoint = 5, MiddleJoint = 8, LittleJoint = 14;
         static readonly int[] Parents = { -1, 0, 1, 2, 3, 0, 5, 6, 0, 8, 9, 0, 11, 12, 0, 14, 15 };
         readonly Quat[] _world = new Quat[Layout.BoneCount];
         readonly Quat[] _bind = new Quat[BoneCount];
@@ -21,19 +19,54 @@ namespace ManipNet.Client
         /// <param name="side">The side of the rig's hand.</param>
         /// <param name="positions">15 bind positions, thumb to little finger, proximal to distal.</param>
         /// <param name="rotations">15 bind rotations in the same order.</param>
-        /// <param name="tips">5 finger tips in the bind pose.</param>
+        /// <param name="tips">5 ends of the fingers' last bones in the bind pose.</param>
         /// <param name="correctRestPose">Whether bones point where the hand's do, or only turn as much.</param>
-        public HandRig(Side side, Vec3[] positions, Quat[] rotations, Vec3[] tips, bool correctRestPose = true)
+        /// <param name="present">Which of the 15 bones the rig has; null for all of them.</param>
+        public HandRig(Side side, Vec3[] positions, Quat[] rotations, Vec3[] tips, bool correctRestPose = true, bool[] present = null)
         {
-            _wristToHand = Frame(positions[Middle], positions[Index] - positions[Little])
-                * Frame(ZeroPosition(side, MiddleJoint), ZeroPosition(side, IndexJoint) - ZeroPosition(side, LittleJoint)).Inverse;
+            bool[] has = present ?? AllBones();
+            _wristToHand = Align(side, positions, has);
             for (int i = 0; i < BoneCount; i++)
             {
-                Vec3 end = i % 3 == 2 ? tips[i / 3] : positions[i + 1];
-                Vec3 ours = ZeroPosition(side, JointAfter(i)) - ZeroPosition(side, OurBone(i));
+                _bind[i] = Quat.Identity;
+                if (!has[i]) continue;
+                int next = i + 1;
+                while (next % 3 != 0 && !has[next]) next++;
+                bool last = next % 3 == 0;
+                Vec3 end = last ? tips[i / 3] : positions[next];
+                Vec3 ours = ZeroPosition(side, last ? JointAfter(i) : OurBone(next)) - ZeroPosition(side, OurBone(i));
                 Quat turn = correctRestPose ? Quat.FromTo(end - positions[i], _wristToHand.Rotate(ours)) : Quat.Identity;
                 _bind[i] = ZeroRotation(side, OurBone(i)).Inverse * _wristToHand.Inverse * turn * rotations[i];
             }
+        }
+
+        static bool[] AllBones()
+        {
+            var all = new bool[BoneCount];
+            for (int i = 0; i < BoneCount; i++) all[i] = true;
+            return all;
+        }
+
+        /// <summary>
+        /// The rotation from the frame of our wrist to that of the rig's hand bone. The first bones of the middle, index and
+        /// little finger define it, or others where these are missing.
+        /// </summary>
+        static Quat Align(Side side, Vec3[] positions, bool[] has)
+        {
+            int along = 0, first = -1, last = -1;
+            foreach (int bone in new[] { 12, 9, 3, 6 })
+                if (has[bone]) along = bone;
+            for (int bone = 3; bone < BoneCount; bone += 3)
+            {
+                if (!has[bone]) continue;
+                if (first < 0) first = bone;
+                last = bone;
+            }
+            if (first == last && has[0]) first = 0;
+            Vec3 ours = ZeroPosition(side, OurBone(along));
+            if (first == last || last < 0) return Quat.FromTo(ours, positions[along]);
+            return Frame(positions[along], positions[first] - positions[last])
+                * Frame(ours, ZeroPosition(side, OurBone(first)) - ZeroPosition(side, OurBone(last))).Inverse;
         }
 
         /// <summary>The rotation of the rig's hand bone that follows the tracked wrist.</summary>
@@ -42,7 +75,10 @@ namespace ManipNet.Client
             return UnityAxes.Rotation(hand.Wrist, 3) * _wristToHand.Inverse;
         }
 
-        /// <summary>Computes the rotations of the 15 finger bones in the space of the rig's hand bone.</summary>
+        /// <summary>
+        /// Computes the rotations of the 15 finger bones in the space of the rig's hand bone; those of bones that the rig
+        /// lacks mean nothing.
+        /// </summary>
         public void Solve(HandFrame hand, Quat[] output)
         {
             _world[0] = _wristToHand;

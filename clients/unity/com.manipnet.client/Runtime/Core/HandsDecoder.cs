@@ -30,7 +30,7 @@ namespace ManipNet.Client
             if (length != total || BitConverter.ToUInt32(data, start + Layout.HeaderTotalSize) != total)
                 return "the message has " + length + " bytes, but its header says " + total;
 
-            string error = Header(data, start, frame);
+            string error = Header(data, start, frame) ?? Timecode(data, start, headerSize, frame);
             int at = start + headerSize;
             for (int i = 0; error == null && i < hands; i++, at += handSize) error = Hand(data, at, frame);
             frame.SetBodyCount(error == null ? bodies : 0);
@@ -51,6 +51,17 @@ namespace ManipNet.Client
             if (!frame.Session.Read(data, at + Layout.HeaderSession) || !frame.Actor.Read(data, at + Layout.HeaderActor))
                 return "the name of the session or the actor is too long or not UTF-8";
             return null;
+        }
+
+        /// <summary>Reads the timecode behind the header's older fields; a shorter header has none.</summary>
+        static string Timecode(byte[] data, int at, int headerSize, HandsFrame frame)
+        {
+            frame.Timecode.Clear();
+            frame.TimecodeRate = 0f;
+            if (headerSize < Layout.TimedHeaderBytes) return null;
+            frame.TimecodeRate = BitConverter.ToSingle(data, at + Layout.HeaderTimecodeRate);
+            if (!frame.Timecode.Read(data, at + Layout.HeaderTimecode)) return "the timecode is too long or not UTF-8";
+            return IsFinite(frame.TimecodeRate) ? null : "the rate of the timecode is not finite";
         }
 
         static string Hand(byte[] data, int at, HandsFrame frame)

@@ -69,6 +69,12 @@ namespace ManipNet.Client
         /// <summary>The times buffer, sense, infer, ik and total, in milliseconds.</summary>
         public readonly float[] LatencyMs = new float[5];
 
+        /// <summary>The SMPTE timecode HH:MM:SS:FF of the instant; empty if the tracker sends none.</summary>
+        public readonly FixedName Timecode = new FixedName();
+
+        /// <summary>The timecode's frames per second; 0 if it is not known.</summary>
+        public float TimecodeRate;
+
         public readonly HandFrame Left = new HandFrame();
         public readonly HandFrame Right = new HandFrame();
         public int BodyCount { get; private set; }
@@ -105,6 +111,8 @@ namespace ManipNet.Client
             TPublish = other.TPublish;
             LookAhead = other.LookAhead;
             Array.Copy(other.LatencyMs, LatencyMs, LatencyMs.Length);
+            Timecode.CopyFrom(other.Timecode);
+            TimecodeRate = other.TimecodeRate;
             Left.CopyFrom(other.Left);
             Right.CopyFrom(other.Right);
             SetBodyCount(other.BodyCount);

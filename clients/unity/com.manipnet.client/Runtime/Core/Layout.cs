@@ -42,6 +42,9 @@ namespace ManipNet.Client
         public const int BodyTracked = 0;
         public const int BodyPose = 4;
         public const int BodyName = 32;
+        public const int TimedHeaderBytes = 280;
+        public const int HeaderTimecode = 208;
+        public const int HeaderTimecodeRate = 272;
         public const string Topic = "pose/bin ";
         public static readonly string[] States =
         {

@@ -51,29 +51,53 @@ namespace ManipNet.Client
             Handshake(Encoding.ASCII.GetBytes(topic));
         }
 
-        /// <summary>Connects without the thread pool, whose threads would remain.</summary>
         Socket Connect(string host, int port)
         {
             IPAddress address;
-            if (!IPAddress.TryParse(host, out address)) address = Dns.GetHostAddresses(host)[0];
-            var socket = new Socket(address.AddressFamily, SocketType.Stream, ProtocolType.Tcp) { Blocking = false };
+            IPAddress[] addresses = IPAddress.TryParse(host, out address) ? new[] { address } : Dns.GetHostAddresses(host);
+            return ConnectToAny(addresses, host, port);
+        }
+
+        /// <summary>
+        /// Connects to the first address that answers. A name may have several: `localhost` is ::1 before 127.0.0.1 on
+        /// Windows, and a server listens on one of them.
+        /// </summary>
+        public Socket ConnectToAny(IPAddress[] addresses, string host, int port)
+        {
+            foreach (IPAddress address in addresses)
+            {
+                Socket socket = TryConnect(address, port);
+                if (socket != null) return socket;
+            }
+            throw new IOException("no server answers at " + host + ":" + port);
+        }
+
+        /// <summary>Connects without the thread pool, whose threads would remain. Returns null if nobody answers.</summary>
+        Socket TryConnect(IPAddress address, int port)
+        {
+            Socket socket = null;
             try
             {
+                socket = new Socket(address.AddressFamily, SocketType.Stream, ProtocolType.Tcp) { Blocking = false };
                 socket.Connect(new IPEndPoint(address, port));
             }
             catch (SocketException error) when (error.SocketErrorCode == SocketError.WouldBlock || error.SocketErrorCode == SocketError.InProgress)
             {
                 // the connection is being made
             }
-            bool open = Ready(socket, ConnectMs, SelectMode.SelectWrite);
-            int result = (int)socket.GetSocketOption(SocketOptionLevel.Socket, SocketOptionName.Error);
-            if (!open || result != 0)
+            catch (SocketException)
             {
-                socket.Close();
-                throw new IOException("no server answers at " + host + ":" + port);
+                if (socket != null) socket.Close(); // the machine has no such network, as without IPv6
+                return null;
             }
-            socket.Blocking = true;
-            return socket;
+            bool open = Ready(socket, ConnectMs, SelectMode.SelectWrite);
+            if (open && (int)socket.GetSocketOption(SocketOptionLevel.Socket, SocketOptionName.Error) == 0)
+            {
+                socket.Blocking = true;
+                return socket;
+            }
+            socket.Close();
+            return null;
         }
 
         public void Close()
@@ -148,6 +172,7 @@ namespace ManipNet.Client
             while (!Stop)
             {
                 if (socket.Poll(1000 * SliceMs, mode)) return true;
+                if (mode == SelectMode.SelectWrite && socket.Poll(0, SelectMode.SelectError)) return false; // refused, on Windows
                 if (LocalClock.Now >= until) return false;
             }
             return false;

@@ -7,7 +7,7 @@ public class ManipNetLiveLink : ModuleRules
         PCHUsage = PCHUsageMode.UseExplicitOrSharedPCHs;
         CppStandard = CppStandardVersion.Default;
         bUseUnity = false;
-        PublicDependencyModuleNames.AddRange(new[] { "Core", "CoreUObject", "LiveLinkInterface" });
+        PublicDependencyModuleNames.AddRange(new[] { "Core", "CoreUObject", "Engine", "LiveLinkInterface", "LiveLinkAnimationCore" });
         PrivateDependencyModuleNames.AddRange(new[] { "Slate", "SlateCore" });
         PrivateDefinitions.Add("MANIPNET_UNREAL=1");
         if (Target.Platform == UnrealTargetPlatform.Win64)

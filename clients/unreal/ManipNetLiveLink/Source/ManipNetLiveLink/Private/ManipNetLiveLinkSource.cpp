@@ -1,10 +1,13 @@
 #include "ManipNetLiveLinkSource.h"
 
 #include "Core/LocalClock.h"
-#include "Core/Skeleton.h"
+#include "Core/Timecode.h"
 #include "HAL/PlatformTime.h"
 #include "ILiveLinkClient.h"
-#include "LiveLinkTypes.h"
+#include "ManipNetLiveLinkSourceSettings.h"
+#include "Misc/FrameRate.h"
+#include "Misc/QualifiedFrameTime.h"
+#include "Misc/Timecode.h"
 #include "Roles/LiveLinkAnimationRole.h"
 #include "Roles/LiveLinkAnimationTypes.h"
 #include "Roles/LiveLinkTransformRole.h"
@@ -14,6 +17,9 @@
 
 namespace
 {
+constexpr double LookEveryS = 0.5;  // a subject appears in Live Link one tick after it was described
+constexpr double SilentAfterS = 1.0;
+
 FTransform ToTransform(const manipnet::UnrealPose& Pose)
 {
     return FTransform(FQuat(Pose.QX, Pose.QY, Pose.QZ, Pose.QW), FVector(Pose.X, Pose.Y, Pose.Z));
@@ -35,10 +41,68 @@ FLiveLinkStaticDataStruct DescribeHand()
     Skeleton.PropertyNames.Add(FName(TEXT("ManipNetWeight")));
     return Static;
 }
+
+/// Sets the times of a frame: that of the engine or of the capture, and the tracker's timecode if it sends one.
+void SetTimes(FLiveLinkBaseFrameData& Data, const manipnet::HandsFrame& Frame, double Time)
+{
+    Data.WorldTime = FLiveLinkWorldTime(Time);
+    manipnet::Timecode Read;
+    if (manipnet::ParseTimecode(Frame.TimecodeText.Text, static_cast<double>(Frame.TimecodeRate), Read))
+    {
+        const FTimecode Timecode(Read.Hours, Read.Minutes, Read.Seconds, Read.Frames, Read.DropFrame);
+        const FFrameRate Rate(static_cast<uint32>(Read.Numerator), static_cast<uint32>(Read.Denominator));
+        Data.MetaData.SceneTime = FQualifiedFrameTime(Timecode, Rate);
+    }
+}
+
+FName SubjectName(const manipnet::HandsFrame& Frame, const FString& Part)
+{
+    return FName(*FString::Printf(TEXT("ManipNet_%s_%s"), UTF8_TO_TCHAR(Frame.Actor.Text), *Part));
+}
+
+std::string ToText(const FString& Text)
+{
+    return std::string(TCHAR_TO_UTF8(*Text));
+}
+
+/// The connection that the settings describe, or what is wrong with their address.
+std::string ReadSettings(const UManipNetLiveLinkSourceSettings& Settings, manipnet::Connection& To)
+{
+    const std::string Problem = manipnet::ParseConnection(ToText(Settings.Address), To);
+    To.Actor = ToText(Settings.Actor);
+    To.DelayS = Settings.Delay;
+    To.Delivery = Settings.Delivery == EManipNetDelivery::Raw ? manipnet::Mode::Raw : manipnet::Mode::Smooth;
+    To.Place.YawDegrees = Settings.Yaw;
+    To.Place.Origin = {Settings.Origin.X, Settings.Origin.Y, Settings.Origin.Z};
+    To.Place.Scale = Settings.Scale;
+    return Problem;
+}
+
+void ShowSettings(const manipnet::Connection& From, UManipNetLiveLinkSourceSettings& Settings)
+{
+    Settings.Address = UTF8_TO_TCHAR(manipnet::FormatAddress(From).c_str());
+    Settings.Actor = UTF8_TO_TCHAR(From.Actor.c_str());
+    Settings.Delay = From.DelayS;
+    Settings.Delivery = From.Delivery == manipnet::Mode::Raw ? EManipNetDelivery::Raw : EManipNetDelivery::Smooth;
+    Settings.Yaw = From.Place.YawDegrees;
+    Settings.Origin = FVector(From.Place.Origin.X, From.Place.Origin.Y, From.Place.Origin.Z);
+    Settings.Scale = From.Place.Scale;
+}
+
+/// What Live Link itself must know: a preset makes the source again from the connection string, and raw frames are shown
+/// the delay late, so that there is a later one to interpolate to.
+void ShowInLiveLink(const manipnet::Connection& From, ULiveLinkSourceSettings& Settings)
+{
+    Settings.ConnectionString = UTF8_TO_TCHAR(manipnet::FormatConnection(From).c_str());
+    if (From.Delivery == manipnet::Mode::Raw)
+    {
+        Settings.BufferSettings.EngineTimeOffset = static_cast<float>(From.DelayS);
+    }
+}
 }
 
 FManipNetLiveLinkSource::FManipNetLiveLinkSource(const FString& ConnectionString)
-    : Error(manipnet::ParseConnection(TCHAR_TO_UTF8(*ConnectionString), Connection))
+    : Error(manipnet::ParseConnection(ToText(ConnectionString), Connection))
 {
 }
 
@@ -46,89 +110,226 @@ void FManipNetLiveLinkSource::ReceiveClient(ILiveLinkClient* InClient, FGuid InS
 {
     LiveLink = InClient;
     SourceGuid = InSourceGuid;
-    Described.Empty();
-    if (Error.empty())
+    Start();
+}
+
+TSubclassOf<ULiveLinkSourceSettings> FManipNetLiveLinkSource::GetSettingsClass() const
+{
+    return UManipNetLiveLinkSourceSettings::StaticClass();
+}
+
+void FManipNetLiveLinkSource::InitializeSettings(ULiveLinkSourceSettings* Settings)
+{
+    if (UManipNetLiveLinkSourceSettings* Own = Cast<UManipNetLiveLinkSourceSettings>(Settings))
     {
-        Client = std::make_unique<manipnet::Client>(Connection);
+        ShowSettings(CurrentConnection(), *Own);
+        ShowInLiveLink(CurrentConnection(), *Own);
+    }
+}
+
+void FManipNetLiveLinkSource::OnSettingsChanged(ULiveLinkSourceSettings* Settings, const FPropertyChangedEvent&)
+{
+    UManipNetLiveLinkSourceSettings* Own = Cast<UManipNetLiveLinkSourceSettings>(Settings);
+    if (!Own)
+    {
+        return;
+    }
+    manipnet::Connection Wanted;
+    const std::string Problem = ReadSettings(*Own, Wanted);
+    const manipnet::Connection Before = CurrentConnection();
+    const bool bRestart = Problem != Error || !Wanted.SameStream(Before);
+    {
+        const std::lock_guard<std::mutex> Guard(Lock);
+        Connection = Wanted;
+    }
+    if (Problem.empty())
+    {
+        ShowInLiveLink(Wanted, *Own);
+    }
+    if (bRestart)
+    {
+        Error = Problem;
+        Retire();
+        Start();
+    }
+    else if (Client)
+    {
+        Client->SetDelay(Wanted.DelayS);
+    }
+}
+
+void FManipNetLiveLinkSource::Start()
+{
+    {
+        const std::lock_guard<std::mutex> Guard(Lock);
+        Described.Empty();
+    }
+    if (Error.empty() && LiveLink)
+    {
+        Client = std::make_unique<manipnet::Client>(
+            CurrentConnection(), [this](const manipnet::HandsFrame& Frame) { PushRaw(Frame); });
+    }
+}
+
+void FManipNetLiveLinkSource::Retire()
+{
+    if (Client)
+    {
+        Client->Stop();
+        Retired.push_back(std::move(Client));
     }
 }
 
 void FManipNetLiveLinkSource::Update()
 {
+    for (std::size_t Index = Retired.size(); Index-- > 0;)
+    {
+        if (Retired[Index]->HasStopped())
+        {
+            Retired.erase(Retired.begin() + static_cast<std::ptrdiff_t>(Index));
+        }
+    }
+    ForgetRemovedSubjects();
     float Weight = 0.0f;
-    // After the fade nothing is pushed, so that Live Link shows the subject as stale.
-    if (!Client || !Client->Sample(manipnet::LocalNow(), Frame, Weight) || Weight <= 0.0f)
+    if (!Client || CurrentConnection().Delivery == manipnet::Mode::Raw)
     {
         return;
     }
-    PushHand(Frame.Hand(manipnet::Side::Left), TEXT("left"), Weight);
-    PushHand(Frame.Hand(manipnet::Side::Right), TEXT("right"), Weight);
-    for (std::size_t Index = 0; Index < Frame.BodyCount; ++Index)
+    // After the fade nothing is pushed, so that Live Link shows the subject as stale.
+    if (Client->Sample(manipnet::LocalNow(), Shown, Weight) && Weight > 0.0f)
     {
-        PushBody(Frame.Bodies[Index]);
+        PushFrame(Shown, Weight, FPlatformTime::Seconds());
     }
 }
 
-void FManipNetLiveLinkSource::PushHand(const manipnet::HandFrame& Hand, const TCHAR* Side, float Weight)
+/// Forgets the subjects that a user removed, so that they are described anew.
+void FManipNetLiveLinkSource::ForgetRemovedSubjects()
 {
+    const double Now = manipnet::LocalNow();
+    if (!LiveLink || Now - Looked < LookEveryS)
+    {
+        return;
+    }
+    Looked = Now;
+    TSet<FName> Present;
+    for (const FLiveLinkSubjectKey& Key : LiveLink->GetSubjects(true, false))
+    {
+        if (Key.Source == SourceGuid)
+        {
+            Present.Add(Key.SubjectName.Name);
+        }
+    }
+    const std::lock_guard<std::mutex> Guard(Lock);
+    Described = Described.FilterByPredicate([&Present, Now](const TPair<FName, double>& Subject)
+        { return Present.Contains(Subject.Key) || Now - Subject.Value < LookEveryS; });
+}
+
+/// Whether Live Link must first get the static data of a subject.
+bool FManipNetLiveLinkSource::MustDescribe(const FName& Name)
+{
+    const std::lock_guard<std::mutex> Guard(Lock);
+    if (Described.Contains(Name))
+    {
+        return false;
+    }
+    Described.Add(Name, manipnet::LocalNow());
+    return true;
+}
+
+manipnet::Connection FManipNetLiveLinkSource::CurrentConnection() const
+{
+    const std::lock_guard<std::mutex> Guard(Lock);
+    return Connection;
+}
+
+/// Called on the client's thread.
+void FManipNetLiveLinkSource::PushRaw(const manipnet::HandsFrame& Frame)
+{
+    if (CurrentConnection().Delivery == manipnet::Mode::Raw)
+    {
+        // Live Link compares the time of capture with the time of arrival and finds the offset between both clocks.
+        PushFrame(Frame, 1.0f, Frame.TCapture);
+    }
+}
+
+void FManipNetLiveLinkSource::PushFrame(const manipnet::HandsFrame& Frame, float Weight, double Time)
+{
+    PushHand(Frame, manipnet::Side::Left, Weight, Time);
+    PushHand(Frame, manipnet::Side::Right, Weight, Time);
+    for (std::size_t Index = 0; Index < Frame.BodyCount; ++Index)
+    {
+        PushBody(Frame, Frame.Bodies[Index], Time);
+    }
+}
+
+void FManipNetLiveLinkSource::PushHand(const manipnet::HandsFrame& Frame, manipnet::Side Side, float Weight, double Time)
+{
+    const manipnet::HandFrame& Hand = Frame.Hand(Side);
     if (!Hand.Present)
     {
         return;
     }
-    const FName Name = SubjectName(Side);
+    const FName Name = SubjectName(Frame, Side == manipnet::Side::Left ? TEXT("left") : TEXT("right"));
     const FLiveLinkSubjectKey Key(SourceGuid, Name);
-    if (!Described.Contains(Name))
+    if (MustDescribe(Name))
     {
-        Described.Add(Name);
         LiveLink->PushSubjectStaticData_AnyThread(Key, ULiveLinkAnimationRole::StaticClass(), DescribeHand());
     }
     FLiveLinkFrameDataStruct Data(FLiveLinkAnimationFrameData::StaticStruct());
     FLiveLinkAnimationFrameData& Animation = *Data.Cast<FLiveLinkAnimationFrameData>();
     manipnet::Skeleton::Poses Poses;
-    manipnet::Skeleton::LocalPoses(Hand, Poses);
+    manipnet::Skeleton::LocalPoses(Hand, CurrentConnection().Place, Poses);
     for (const manipnet::UnrealPose& Pose : Poses)
     {
         Animation.Transforms.Add(ToTransform(Pose));
     }
     Animation.PropertyValues.Add(Weight);
-    Animation.WorldTime = FLiveLinkWorldTime(FPlatformTime::Seconds());
+    SetTimes(Animation, Frame, Time);
     LiveLink->PushSubjectFrameData_AnyThread(Key, MoveTemp(Data));
 }
 
-void FManipNetLiveLinkSource::PushBody(const manipnet::BodyFrame& Body)
+void FManipNetLiveLinkSource::PushBody(const manipnet::HandsFrame& Frame, const manipnet::BodyFrame& Body, double Time)
 {
     if (!Body.Tracked)
     {
         return;
     }
-    const FName Name = SubjectName(UTF8_TO_TCHAR(Body.BodyName.Text));
+    const FName Name = SubjectName(Frame, UTF8_TO_TCHAR(Body.BodyName.Text));
     const FLiveLinkSubjectKey Key(SourceGuid, Name);
-    if (!Described.Contains(Name))
+    if (MustDescribe(Name))
     {
-        Described.Add(Name);
         FLiveLinkStaticDataStruct Static(FLiveLinkTransformStaticData::StaticStruct());
         LiveLink->PushSubjectStaticData_AnyThread(Key, ULiveLinkTransformRole::StaticClass(), MoveTemp(Static));
     }
     FLiveLinkFrameDataStruct Data(FLiveLinkTransformFrameData::StaticStruct());
     FLiveLinkTransformFrameData& Pose = *Data.Cast<FLiveLinkTransformFrameData>();
-    Pose.Transform = ToTransform(manipnet::ToUnreal(Body.Pose.data()));
-    Pose.WorldTime = FLiveLinkWorldTime(FPlatformTime::Seconds());
+    Pose.Transform = ToTransform(CurrentConnection().Place.Place(manipnet::ToUnreal(Body.Pose.data())));
+    SetTimes(Pose, Frame, Time);
     LiveLink->PushSubjectFrameData_AnyThread(Key, MoveTemp(Data));
-}
-
-FName FManipNetLiveLinkSource::SubjectName(const FString& Part) const
-{
-    return FName(*FString::Printf(TEXT("ManipNet_%s_%s"), UTF8_TO_TCHAR(Frame.Actor.Text), *Part));
 }
 
 bool FManipNetLiveLinkSource::IsSourceStillValid() const
 {
-    return Client != nullptr;
+    if (!Client)
+    {
+        return false;
+    }
+    const manipnet::Stats Stats = Client->GetStats();
+    return Stats.Received > 0 && Stats.AgeS < SilentAfterS;
 }
 
+/// Live Link calls this again until it returns true; it never waits for the thread.
 bool FManipNetLiveLinkSource::RequestSourceShutdown()
 {
-    Client.reset();
+    Retire();
+    for (const std::unique_ptr<manipnet::Client>& Ending : Retired)
+    {
+        if (!Ending->HasStopped())
+        {
+            return false;
+        }
+    }
+    Retired.clear();
     LiveLink = nullptr;
     return true;
 }
@@ -140,7 +341,8 @@ FText FManipNetLiveLinkSource::GetSourceType() const
 
 FText FManipNetLiveLinkSource::GetSourceMachineName() const
 {
-    return FText::FromString(FString::Printf(TEXT("%s:%d"), UTF8_TO_TCHAR(Connection.Host.c_str()), Connection.Port));
+    const manipnet::Connection To = CurrentConnection();
+    return FText::FromString(FString::Printf(TEXT("%s:%d"), UTF8_TO_TCHAR(To.Host.c_str()), static_cast<int32>(To.Port)));
 }
 
 FText FManipNetLiveLinkSource::GetSourceStatus() const
@@ -150,9 +352,13 @@ FText FManipNetLiveLinkSource::GetSourceStatus() const
         return FText::FromString(Error.empty() ? FString(TEXT("closed")) : FString(UTF8_TO_TCHAR(Error.c_str())));
     }
     const manipnet::Stats Stats = Client->GetStats();
-    if (Stats.State != "connected" || Stats.Received == 0)
+    if (Stats.State != "connected")
     {
         return FText::FromString(UTF8_TO_TCHAR(Stats.State.c_str()));
+    }
+    if (Stats.Received == 0)
+    {
+        return LOCTEXT("NoFrames", "connected, but no hands have arrived");
     }
     return FText::FromString(FString::Printf(
         TEXT("%.0f Hz, age %.0f ms, %lld lost"), Stats.RateHz, 1000.0 * Stats.AgeS, static_cast<long long>(Stats.Lost)));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
+#include <utility>
 
 #include "Decoder.h"
 #include "LocalClock.h"
@@ -15,23 +16,33 @@ constexpr int kBackOffLimitMs = 1000;
 
 }  // namespace
 
-Client::Client(const Connection& to) : To(to), Subscriber(layout::kMaxPayloadBytes, Stopping) {
+Client::Client(const Connection& to, OnFrame arrived)
+    : To(to), Arrived(std::move(arrived)), Subscriber(layout::kMaxPayloadBytes, Stopping) {
     Frames.DelayS = to.DelayS;
     Thread = std::thread([this] { Run(); });
 }
 
 Client::~Client() {
+    Stop();
+    Thread.join();
+}
+
+void Client::Stop() {
     {
         const std::lock_guard<std::mutex> guard(Lock);
         Stopping = true;
     }
     Wake.notify_all();
-    Thread.join();
 }
 
 bool Client::Sample(double now, HandsFrame& output, float& weight) {
     const std::lock_guard<std::mutex> guard(Lock);
     return Frames.Sample(now, output, weight);
+}
+
+void Client::SetDelay(double delayS) {
+    const std::lock_guard<std::mutex> guard(Lock);
+    Frames.DelayS = delayS;
 }
 
 Stats Client::GetStats() const {
@@ -67,6 +78,7 @@ void Client::Run() {
         Wake.wait_for(guard, std::chrono::milliseconds(wait), [this] { return Stopping.load(); });
     }
     SetState("closed");
+    Stopped = true;
 }
 
 /// Reads until the connection breaks, and returns the reason.
@@ -98,8 +110,15 @@ void Client::Take(double arrival) {
         ++Counted.Refused;
         return;
     }
-    const std::lock_guard<std::mutex> guard(Lock);
     if (!IsOurActor()) return;
+    if (Arrived) Arrived(*Spare);  // outside of the lock, because it may wait for a lock of its own
+    const std::lock_guard<std::mutex> guard(Lock);
+    Count(arrival);
+    if (Frames.Push(Spare, arrival)) NewestAt = arrival;
+    if (Counted.State != "connected") Counted.State = "connected";
+}
+
+void Client::Count(double arrival) {
     Actor = Spare->Actor;
     const bool same = Counted.Received > 0 && Spare->Session == Session;
     if (same && Spare->Seq > Seq + 1) Counted.Lost += static_cast<std::int64_t>(Spare->Seq - Seq - 1);
@@ -107,10 +126,9 @@ void Client::Take(double arrival) {
     Seq = Spare->Seq;
     Arrivals[static_cast<std::size_t>(Counted.Received++) % Arrivals.size()] = arrival;
     Counted.TransitS = arrival - Spare->TPublish;
-    if (Frames.Push(Spare, arrival)) NewestAt = arrival;
-    if (Counted.State != "connected") Counted.State = "connected";
 }
 
+/// Only the client's thread writes what this reads.
 bool Client::IsOurActor() const {
     if (!To.Actor.empty()) return To.Actor == Spare->Actor.Text;
     return Counted.Received == 0 || Spare->Actor == Actor;

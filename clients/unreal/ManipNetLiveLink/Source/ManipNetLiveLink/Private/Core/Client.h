@@ -4,6 +4,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -34,7 +35,9 @@ struct Stats {
 /// thread.
 class Client {
 public:
-    explicit Client(const Connection& to);
+    /// Calls `arrived`, if there is one, for every frame of the actor, on the client's thread.
+    using OnFrame = std::function<void(const HandsFrame&)>;
+    explicit Client(const Connection& to, OnFrame arrived = {});
     ~Client();
     Client(const Client&) = delete;
     Client& operator=(const Client&) = delete;
@@ -42,18 +45,26 @@ public:
     /// Computes the hands to show at the time `now` of LocalNow; see Interpolator::Sample.
     bool Sample(double now, HandsFrame& output, float& weight);
     Stats GetStats() const;
+    void SetDelay(double delayS);
+
+    /// Asks the thread to end, without waiting for it; HasStopped tells when the destructor no longer waits.
+    void Stop();
+    bool HasStopped() const { return Stopped; }
 
 private:
     void Run();
     std::string Read();
     void Take(double arrival);
+    void Count(double arrival);
     bool IsOurActor() const;
     void SetState(const std::string& state);
 
     const Connection To;
+    const OnFrame Arrived;
     mutable std::mutex Lock;
     std::condition_variable Wake;
     std::atomic<bool> Stopping{false};
+    std::atomic<bool> Stopped{false};
     ZmtpSubscriber Subscriber;
     Interpolator Frames;
     std::unique_ptr<HandsFrame> Spare = std::make_unique<HandsFrame>();

@@ -1,11 +1,33 @@
 #include "Connection.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
-#include <sstream>
+#include <vector>
 
 namespace manipnet {
 namespace {
+
+constexpr const char* kKeys = "actor=NAME, delay=SECONDS, mode=smooth or raw, yaw=DEGREES, origin=X,Y,Z and scale=FACTOR";
+constexpr double kMaxOriginCm = 1e7;
+
+/// Splits a text at spaces outside of double quotes, which it removes.
+std::vector<std::string> Words(const std::string& text) {
+    std::vector<std::string> words;
+    bool quoted = false;
+    bool inside = false;
+    for (const char c : text) {
+        const bool space = !quoted && (c == ' ' || c == '\t' || c == '\n' || c == '\r');
+        if (!space && !inside) words.emplace_back();
+        inside = !space;
+        if (c == '"') {
+            quoted = !quoted;
+        } else if (inside) {
+            words.back() += c;
+        }
+    }
+    return words;
+}
 
 std::string ParseAddress(const std::string& address, Connection& connection) {
     static const std::string kScheme = "tcp://";
@@ -25,36 +47,88 @@ std::string ParseAddress(const std::string& address, Connection& connection) {
     return {};
 }
 
-std::string ParseDelay(const std::string& value, Connection& connection) {
+/// Reads a number from `least` to `most` that ends at `stop`, and moves `at` behind it.
+bool ReadNumber(const char*& at, char stop, double least, double most, double& value) {
     char* end = nullptr;
-    const double delay = std::strtod(value.c_str(), &end);
-    if (value.empty() || *end != '\0' || !(delay >= 0.0 && delay <= Connection::kMaxDelayS))
-        return "the delay is \"" + value + "\"; allowed are 0 to 1 seconds";
-    connection.DelayS = delay;
+    const double number = std::strtod(at, &end);
+    const bool good = end != at && *end == stop && number >= least && number <= most;
+    at = end + (stop == '\0' ? 0 : 1);
+    if (good) value = number;
+    return good;
+}
+
+std::string ParseNumber(const char* what, const std::string& text, double least, double most, const char* allowed, double& value) {
+    const char* at = text.c_str();
+    if (ReadNumber(at, '\0', least, most, value)) return {};
+    return std::string("the ") + what + " is \"" + text + "\"; allowed " + allowed;
+}
+
+std::string ParseOrigin(const std::string& text, Vec& origin) {
+    const char* at = text.c_str();
+    Vec read;
+    if (ReadNumber(at, ',', -kMaxOriginCm, kMaxOriginCm, read.X) && ReadNumber(at, ',', -kMaxOriginCm, kMaxOriginCm, read.Y) &&
+        ReadNumber(at, '\0', -kMaxOriginCm, kMaxOriginCm, read.Z)) {
+        origin = read;
+        return {};
+    }
+    return "the origin is \"" + text + "\"; allowed are three numbers in centimetres, as in 100,0,-50";
+}
+
+std::string ParseMode(const std::string& text, Mode& mode) {
+    if (text != "smooth" && text != "raw") return "the mode is \"" + text + "\"; allowed are smooth and raw";
+    mode = text == "raw" ? Mode::Raw : Mode::Smooth;
     return {};
+}
+
+std::string ParseSetting(const std::string& word, Connection& to) {
+    const std::size_t equals = word.find('=');
+    const std::string key = word.substr(0, equals);
+    const std::string value = equals == std::string::npos ? std::string() : word.substr(equals + 1);
+    if (key == "actor") {
+        to.Actor = value;
+        return {};
+    }
+    if (key == "delay") return ParseNumber("delay", value, 0.0, Connection::kMaxDelayS, "are 0 to 1 seconds", to.DelayS);
+    if (key == "mode") return ParseMode(value, to.Delivery);
+    if (key == "yaw") return ParseNumber("yaw", value, -360.0, 360.0, "are -360 to 360 degrees", to.Place.YawDegrees);
+    if (key == "origin") return ParseOrigin(value, to.Place.Origin);
+    if (key == "scale")
+        return ParseNumber("scale", value, Connection::kMinScale, Connection::kMaxScale, "are 0.001 to 1000", to.Place.Scale);
+    return "\"" + word + "\" is unknown; allowed after the address are " + kKeys;
+}
+
+std::string Short(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.9g", value);
+    return text;
 }
 
 }  // namespace
 
 std::string ParseConnection(const std::string& text, Connection& connection) {
     connection = Connection();
-    std::istringstream words(text);
-    std::string word;
-    if (!(words >> word)) return {};
-    std::string error = ParseAddress(word, connection);
-    while (error.empty() && words >> word) {
-        const std::size_t equals = word.find('=');
-        const std::string key = word.substr(0, equals);
-        const std::string value = equals == std::string::npos ? std::string() : word.substr(equals + 1);
-        if (key == "actor") {
-            connection.Actor = value;
-        } else if (key == "delay") {
-            error = ParseDelay(value, connection);
-        } else {
-            error = "\"" + word + "\" is unknown; allowed after the address are actor=NAME and delay=SECONDS";
-        }
-    }
+    const std::vector<std::string> words = Words(text);
+    std::string error = words.empty() ? std::string() : ParseAddress(words[0], connection);
+    for (std::size_t i = 1; error.empty() && i < words.size(); ++i) error = ParseSetting(words[i], connection);
     return error;
+}
+
+std::string FormatAddress(const Connection& c) {
+    const bool brackets = c.Host.find(':') != std::string::npos;
+    return "tcp://" + (brackets ? "[" + c.Host + "]" : c.Host) + ":" + std::to_string(c.Port);
+}
+
+std::string FormatConnection(const Connection& c) {
+    const Connection standard;
+    std::string text = FormatAddress(c);
+    if (!c.Actor.empty()) text += c.Actor.find(' ') == std::string::npos ? " actor=" + c.Actor : " actor=\"" + c.Actor + "\"";
+    if (c.DelayS != standard.DelayS) text += " delay=" + Short(c.DelayS);
+    if (c.Delivery == Mode::Raw) text += " mode=raw";
+    if (c.Place.YawDegrees != 0.0) text += " yaw=" + Short(c.Place.YawDegrees);
+    const Vec& o = c.Place.Origin;
+    if (o.X != 0.0 || o.Y != 0.0 || o.Z != 0.0) text += " origin=" + Short(o.X) + "," + Short(o.Y) + "," + Short(o.Z);
+    if (c.Place.Scale != 1.0) text += " scale=" + Short(c.Place.Scale);
+    return text;
 }
 
 }  // namespace manipnet

@@ -50,6 +50,16 @@ bool ReadName(const std::uint8_t* at, Name& name) {
     return true;
 }
 
+/// Reads the timecode behind the header's older fields; a shorter header has none.
+std::string ReadTimecode(const std::uint8_t* at, std::size_t headerSize, HandsFrame& frame) {
+    frame.TimecodeText = Name();
+    frame.TimecodeRate = 0.0F;
+    if (headerSize < layout::kTimedHeaderBytes) return {};
+    frame.TimecodeRate = Read<float>(at + layout::kHeaderTimecodeRate);
+    if (!ReadName(at + layout::kHeaderTimecode, frame.TimecodeText)) return "the timecode is too long or not UTF-8";
+    return std::isfinite(frame.TimecodeRate) ? std::string() : "the rate of the timecode is not finite";
+}
+
 std::string ReadHeader(const std::uint8_t* at, HandsFrame& frame) {
     frame.Seq = Read<std::uint64_t>(at + layout::kHeaderSeq);
     frame.TCapture = Read<double>(at + layout::kHeaderTCapture);
@@ -117,6 +127,7 @@ std::string Decode(const std::uint8_t* data, std::size_t length, HandsFrame& fra
         return "the message has " + std::to_string(length) + " bytes, but its header says " + std::to_string(total);
 
     std::string error = ReadHeader(data, frame);
+    if (error.empty()) error = ReadTimecode(data, headerSize, frame);
     const std::uint8_t* at = data + headerSize;
     for (std::size_t i = 0; error.empty() && i < hands; ++i, at += handSize) error = ReadHand(at, frame);
     frame.SetBodyCount(error.empty() ? bodies : 0);

@@ -50,6 +50,8 @@ struct HandsFrame {
     double TPublish = 0.0;
     double LookAhead = 0.0;
     std::array<float, 5> LatencyMs{};
+    Name TimecodeText;          ///< "HH:MM:SS:FF" of the instant, empty if the tracker sends none.
+    float TimecodeRate = 0.0F;  ///< Frames per second, 0 if it is not known.
     std::array<HandFrame, 2> Hands;  ///< Indexed by Side.
     std::size_t BodyCount = 0;       ///< Used part of Bodies, which never shrinks, so that frames allocate nothing.
     std::vector<BodyFrame> Bodies;
@@ -70,6 +72,8 @@ struct HandsFrame {
         TPublish = other.TPublish;
         LookAhead = other.LookAhead;
         LatencyMs = other.LatencyMs;
+        TimecodeText = other.TimecodeText;
+        TimecodeRate = other.TimecodeRate;
         Hands = other.Hands;
         SetBodyCount(other.BodyCount);
         for (std::size_t i = 0; i < BodyCount; ++i) Bodies[i] = other.Bodies[i];

@@ -44,6 +44,9 @@ inline constexpr std::uint32_t kBodyBytes = 96;
 inline constexpr std::uint32_t kBodyTracked = 0;
 inline constexpr std::uint32_t kBodyPose = 4;
 inline constexpr std::uint32_t kBodyName = 32;
+inline constexpr std::uint32_t kTimedHeaderBytes = 280;
+inline constexpr std::uint32_t kHeaderTimecode = 208;
+inline constexpr std::uint32_t kHeaderTimecodeRate = 272;
 inline constexpr char kTopic[] = "pose/bin ";
 inline constexpr const char* kStates[] = {
     "live",

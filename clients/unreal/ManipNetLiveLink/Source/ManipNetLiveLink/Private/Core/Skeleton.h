@@ -3,8 +3,8 @@
 #include <array>
 #include <cstddef>
 
-#include "Axes.h"
 #include "HandsFrame.h"
+#include "Placement.h"
 
 namespace manipnet {
 
@@ -15,7 +15,7 @@ struct Skeleton {
 
     static const char* BoneName(std::size_t bone);
     static int ParentOf(std::size_t bone);  ///< -1 for the wrist.
-    static void LocalPoses(const HandFrame& hand, Poses& output);
+    static void LocalPoses(const HandFrame& hand, const Placement& placement, Poses& output);
 };
 
 }  // namespace manipnet

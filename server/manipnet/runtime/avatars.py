@@ -1,0 +1,112 @@
+"""The avatars of a server: hand profiles that clients upload or the rig names, and the hands solved on them."""
+
+import logging
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Protocol
+
+from manipnet.actors.actor import Actor
+from manipnet.actors.avatar import Avatar
+from manipnet.actors.transitions import ShownHand
+from manipnet.synthesis.hand.profile import HandProfile
+from manipnet.telemetry import Telemetry
+from manipnet.tracking.tick import Tick
+from manipnet.wire import HandsMessage, Side
+
+MAX_PROFILES: Final = 16
+FORGET_AFTER_S: Final = 60.0
+"""An uploaded profile that nobody has subscribed to for this long is forgotten."""
+_log = logging.getLogger(__name__)
+
+
+class AvatarAudience(Protocol):
+    """Sends the hands of avatars, and knows who has subscribed to them."""
+
+    def wants(self, avatar: str) -> bool: ...
+
+    def publish_avatar(self, message: HandsMessage) -> None: ...
+
+
+class TooManyProfilesError(ValueError):
+    """There is no room for another profile; the text says what to do."""
+
+
+@dataclass
+class _Entry:
+    avatar: Avatar
+    actor: str
+    stays: bool
+    """Whether it was given at the start of the server, and is never forgotten."""
+    wanted_s: float
+    """When somebody was subscribed to it, or uploaded it, for the last time."""
+
+
+class Avatars:
+    """Belongs to the tick thread."""
+
+    def __init__(self, telemetry: Telemetry, clock: Callable[[], float] = time.monotonic) -> None:
+        self._telemetry, self._clock = telemetry, clock
+        self._entries: dict[str, _Entry] = {}
+        self.audience: AvatarAudience | None = None
+
+    def add(self, avatar: Avatar, actor: str, stays: bool = False) -> None:
+        """Let an avatar follow an actor, in place of one of the same name. Raises `TooManyProfilesError`."""
+        name, now_s = avatar.profile.name, self._clock()
+        before = self._entries.get(name)
+        if before is None and len(self._entries) >= MAX_PROFILES:
+            raise TooManyProfilesError(
+                f"the server already has {MAX_PROFILES} hand profiles ({', '.join(self._entries)}); one is forgotten "
+                f"{FORGET_AFTER_S:.0f} s after its last subscriber has left"
+            )
+        self._entries[name] = _Entry(avatar, actor, stays or (before is not None and before.stays), now_s)
+
+    def names(self) -> dict[str, str]:
+        """The actor of each profile by the profile's name."""
+        return {name: entry.actor for name, entry in self._entries.items()}
+
+    def profiles(self) -> list[HandProfile]:
+        """The profiles of all avatars."""
+        return [entry.avatar.profile for entry in self._entries.values()]
+
+    def show(self, actor: Actor, tick: Tick, hands: Mapping[Side, ShownHand], message: HandsMessage) -> None:
+        """Publish the hands of the actor's avatars to which somebody has subscribed, for a tick just published."""
+        for name, entry in self._entries.items():
+            if entry.actor == actor.config.name and self._is_wanted(name, entry):
+                self._publish(entry.avatar, actor, tick, hands, message)
+
+    def forget_unwanted(self) -> None:
+        """Forget profiles to which nobody has subscribed for a while."""
+        now_s = self._clock()
+        for name, entry in list(self._entries.items()):
+            if not entry.stays and not self._is_wanted(name, entry) and now_s - entry.wanted_s > FORGET_AFTER_S:
+                del self._entries[name]
+
+    def _is_wanted(self, name: str, entry: _Entry) -> bool:
+        wanted = self.audience is not None and self.audience.wants(name)
+        if wanted:
+            entry.wanted_s = self._clock()
+        return wanted
+
+    def _publish(
+        self, avatar: Avatar, actor: Actor, tick: Tick, hands: Mapping[Side, ShownHand], message: HandsMessage
+    ) -> None:
+        assert self.audience is not None
+        try:
+            poses = avatar.poses(actor, tick, hands)
+            self.audience.publish_avatar(
+                replace(message, hands=poses, hand=avatar.profile.name, t_publish=self._clock())
+            )
+        except Exception as error:
+            self._telemetry.count("tick_errors", stage="avatar")
+            _log.error("hand profile %s failed: %s: %s", avatar.profile.name, type(error).__name__, error)
+            avatar.restart()
+
+
+def avatars_of(actors: Sequence[Actor], profiles: Mapping[str, Avatar], telemetry: Telemetry) -> Avatars:
+    """The avatars that the rig names, `profiles` by actor, which stay."""
+    avatars = Avatars(telemetry)
+    for actor in actors:
+        if actor.config.name in profiles:
+            avatars.add(profiles[actor.config.name], actor.config.name, stays=True)
+    return avatars

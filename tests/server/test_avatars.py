@@ -1,0 +1,154 @@
+"""Hands solved on avatars, by a real server: upload, topics, limits of number, a rig's own profile."""
+
+import json
+import time
+
+import msgpack
+import numpy as np
+import pytest
+import zmq
+from avatar_profiles import as_content, scaled_profile
+from live_server import serving
+
+from manipnet.actors.avatar import Avatar
+from manipnet.runtime.avatars import FORGET_AFTER_S, MAX_PROFILES, Avatars, TooManyProfilesError
+from manipnet.synthesis.hand.profile import profile_to_json
+from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet.telemetry import Telemetry
+from manipnet.wire import decode_binary, decode_msgpack
+
+MODEL = shipped_hand()
+LONG, SMALL = scaled_profile(MODEL, 1.15, name="long"), scaled_profile(MODEL, whole=0.85, name="small")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    file = tmp_path_factory.mktemp("hand") / "small.json"
+    file.write_text(profile_to_json(SMALL), encoding="utf-8")
+    with serving("--demo", "--hand", str(file)) as server:
+        yield server
+
+
+def received(server, *topics: str, seconds: float = 3.0) -> dict[str, list[bytes]]:
+    with zmq.Context() as context, context.socket(zmq.SUB) as sub:
+        sub.setsockopt(zmq.LINGER, 0)
+        sub.connect(server.addresses["hands"])
+        for topic in topics:
+            sub.subscribe(f"{topic} ")
+        found: dict[str, list[bytes]] = {topic: [] for topic in topics}
+        end_s = time.monotonic() + seconds
+        while time.monotonic() < end_s:
+            if sub.poll(100):
+                topic, _, payload = sub.recv().partition(b" ")
+                found[topic.decode()].append(payload)
+        return found
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_an_uploaded_hand_is_published_beside_the_models(server, nested):
+    content = as_content(LONG)
+    request = {"op": "hand_profile", "profile": content} if nested else {"op": "hand_profile", **content}
+    answer = server.ask(request, as_json=True)
+    assert answer["topics"] == ["hand/long/msgpack", "hand/long/bin"]
+    found = received(server, "hand/long/msgpack", "hand/long/bin", "pose/msgpack")
+    assert min(map(len, found.values())) > 60
+    last = msgpack.unpackb(found["hand/long/msgpack"][-1])
+    assert last["hand"] == "long"
+    assert "hand" not in msgpack.unpackb(found["pose/msgpack"][-1])
+    models = {m["seq"]: m for m in map(msgpack.unpackb, found["pose/msgpack"])}
+    binary = {m.seq: m for m in map(decode_binary, found["hand/long/bin"])}
+    message = decode_msgpack(found["hand/long/msgpack"][-2])
+    np.testing.assert_allclose(binary[message.seq].hands["left"].joints, message.hands["left"].joints, atol=1e-6)
+    for side, hand in message.hands.items():
+        model = models[message.seq]["hands"][side]
+        assert hand.scale == 1.0
+        assert hand.wrist_shift is not None
+        assert np.linalg.norm(hand.wrist_shift) <= 0.03 + 1e-6
+        np.testing.assert_allclose(hand.wrist[:3] - hand.wrist_shift, model["wrist"]["p"], atol=1e-6)
+        np.testing.assert_allclose(hand.joints[1, :3], hand.wrist[:3], atol=1e-6)
+        rest = LONG.hands[side].joints
+        for a, b in ((7, 8), (8, 9), (9, 10), (3, 4), (1, 7)):
+            assert np.linalg.norm(hand.joints[b, :3] - hand.joints[a, :3]) == pytest.approx(
+                np.linalg.norm(rest[b, :3] - rest[a, :3]), abs=1e-5
+            )
+
+
+def test_the_hand_of_the_command_line_is_there_from_the_start(server):
+    found = received(server, "hand/small/bin", seconds=2.0)
+    assert len(found["hand/small/bin"]) > 30
+
+
+@pytest.mark.parametrize(
+    ("request_", "reason"),
+    [
+        ({}, "name must be a text"),
+        ({"name": "x"}, "neither a left nor a right hand"),
+        ({"name": "x", "left": {"joints": 3}}, "left: joints must be a list of 26"),
+        ({"name": "x", "left": as_content(LONG)["right"]}, "this is a right hand"),
+        ({**as_content(LONG), "actor": "nobody"}, "actor is 'nobody'"),
+        ({"profile": 3}, "is a map"),
+    ],
+)
+def test_a_wrong_profile_is_refused_and_the_server_goes_on(server, request_, reason):
+    assert reason in server.ask({"op": "hand_profile", **request_})["error"]
+    assert server.ask({"op": "ping"})["t"] > 0
+
+
+class Audience:
+    def __init__(self):
+        self.wanted: set[str] = set()
+
+    def wants(self, avatar):
+        return avatar in self.wanted
+
+    def publish_avatar(self, message):
+        raise AssertionError
+
+
+def test_a_profile_is_forgotten_when_nobody_subscribes():
+    now = [0.0]
+    avatars, audience = Avatars(Telemetry(), lambda: now[0]), Audience()
+    avatars.audience = audience
+    avatars.add(Avatar(LONG, MODEL), "actor")
+    avatars.add(Avatar(SMALL, MODEL), "actor", stays=True)
+    audience.wanted = {"long"}
+    now[0] = 10 * FORGET_AFTER_S
+    avatars.forget_unwanted()
+    assert set(avatars.names()) == {"long", "small"}
+    audience.wanted.clear()
+    now[0] += FORGET_AFTER_S - 1.0
+    avatars.forget_unwanted()
+    assert "long" in avatars.names()
+    now[0] += 2.0
+    avatars.forget_unwanted()
+    assert set(avatars.names()) == {"small"}
+
+
+def test_there_is_room_for_sixteen_profiles():
+    avatars = Avatars(Telemetry())
+    for n in range(MAX_PROFILES):
+        avatars.add(Avatar(scaled_profile(MODEL, name=f"hand{n}"), MODEL), "actor")
+    avatars.add(Avatar(scaled_profile(MODEL, 1.1, name="hand3"), MODEL), "actor")
+    with pytest.raises(TooManyProfilesError, match="already has 16"):
+        avatars.add(Avatar(LONG, MODEL), "actor")
+
+
+def test_a_wrong_hand_file_stops_the_start(tmp_path):
+    from live_server import LiveServer
+
+    file = tmp_path / "hand.json"
+    file.write_text(json.dumps({"name": "x"}), encoding="utf-8")
+    server = LiveServer("--demo", "--hand", str(file))
+    assert server.process.wait(120) == 1
+    assert "has neither a left nor a right hand" in "".join(server.errors)
+
+
+def test_the_python_client_uploads_and_receives(server):
+    from manipnet_client import Client, ControlClient
+
+    control = ControlClient(server.addresses["control"])
+    name = control.upload_hand(as_content(scaled_profile(MODEL, 0.9, name="python")))
+    with Client(server.addresses["hands"], hand=name) as client:
+        hands = client.wait(timeout_s=20.0)
+        assert hands is not None
+        assert hands.left is not None

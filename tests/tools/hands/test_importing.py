@@ -1,0 +1,193 @@
+"""Hands of avatars imported from rigs: names, units, sides, straightening, and what is refused."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+
+from manipnet.geometry import SIDES, quat_exp, quat_rotate
+from manipnet.synthesis.hand.avatar import model_profile
+from manipnet.synthesis.hand.profile import FINGERS, ProfileError, read_profile
+from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet_tools.cli import main
+from manipnet_tools.hands.importing import import_profile
+from manipnet_tools.hands.rig_file import RigFileError
+
+MODEL = shipped_hand()
+WORDS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
+TURN = quat_exp(np.array([0.4, -1.1, 0.7]))
+
+
+def rig(scale=1.0, name="{side}Hand{word}{n}", hand="{side}Hand", tips=True, sides=SIDES, flip=False, fingers=5):
+    """Nodes of a rig with the model's hands, turned and somewhere in the world: names, parents and positions."""
+    nodes = [("Hips", -1, np.zeros(3))]
+    for side in sides:
+        joints = model_profile(MODEL, side).joints[:, :3] * scale * ([-1, 1, 1] if flip else [1, 1, 1])
+        at = np.array([0.7 if side == "left" else -0.7, 1.4, 0.1]) * scale
+        placed = at + quat_rotate(TURN, joints)
+        wrist = len(nodes)
+        nodes.append((hand.format(side=side.capitalize()), 0, placed[1]))
+        for word, row in list(zip(WORDS, FINGERS, strict=True))[:fingers]:
+            parent = wrist
+            for n, k in enumerate(row if word == "Thumb" else row[1:]):
+                if n < 3 or tips:
+                    nodes.append((name.format(side=side.capitalize(), word=word, n=n + 1), parent, placed[k]))
+                    parent = len(nodes) - 1
+    return nodes
+
+
+def write_glb(path, nodes, **more):
+    children = {n: [k for k, (_, parent, _) in enumerate(nodes) if parent == n] for n in range(len(nodes))}
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [
+            {
+                "name": name,
+                "translation": (place - (nodes[parent][2] if parent >= 0 else 0.0)).tolist(),
+                **({"children": children[n]} if children[n] else {}),
+            }
+            for n, (name, parent, place) in enumerate(nodes)
+        ],
+        **more,
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(b"glTF" + struct.pack("<2I", 2, 20 + len(text)) + struct.pack("<I4s", len(text), b"JSON") + text)
+    return path
+
+
+def write_bvh(path, nodes):
+    def joint(n, depth):
+        name, parent, place = nodes[n]
+        offset = place - (nodes[parent][2] if parent >= 0 else 0.0)
+        kind = "ROOT" if parent < 0 else "JOINT"
+        lines = [f"{kind} {name}", "{", f"OFFSET {offset[0]} {offset[1]} {offset[2]}", "CHANNELS 0"]
+        below = [k for k, (_, above, _) in enumerate(nodes) if above == n]
+        for k in below:
+            lines += joint(k, depth + 1)
+        if not below:
+            lines += ["End Site", "{", "OFFSET 0 0 0", "}"]
+        return [*lines, "}"]
+
+    text = ["HIERARCHY", *joint(0, 0), "MOTION", "Frames: 1", "Frame Time: 0.01", ""]
+    path.write_text("\n".join(text).replace("CHANNELS 0", "CHANNELS 3 Zrotation Xrotation Yrotation"))
+    channels = 3 * len(nodes)
+    path.write_text(path.read_text() + " ".join(["0"] * channels) + "\n")
+    return path
+
+
+def same_hand(profile, side, atol=5e-4):
+    expected = model_profile(MODEL, side).joints
+    for row in FINGERS:
+        chain = list(row if row is FINGERS[0] else row[1:])
+        found = profile.hands[side].joints
+        lengths = np.linalg.norm(np.diff(found[chain, :3], axis=0), axis=1)
+        np.testing.assert_allclose(lengths, np.linalg.norm(np.diff(expected[chain, :3], axis=0), axis=1), atol=atol)
+        np.testing.assert_allclose(found[chain[0], :3], expected[chain[0], :3], atol=atol)
+        back = quat_rotate(found[chain[1], 3:], np.array([0.0, 1.0, 0.0]))
+        assert back @ quat_rotate(expected[chain[1], 3:], np.array([0.0, 1.0, 0.0])) > 0.98
+
+
+@pytest.mark.parametrize("name", ["{side}Hand{word}{n}", "mixamorig:{side}Hand{word}{n}"])
+def test_a_rig_is_found_wherever_it_stands(tmp_path, name):
+    said = []
+    file = write_glb(tmp_path / "avatar.glb", rig(name=name))
+    profile = import_profile(file, "a", MODEL, said.append)
+    for side in SIDES:
+        same_hand(profile, side)
+        assert any(line.startswith(f"{side}: hand bone") for line in said)
+
+
+def test_a_vrm_file_names_its_bones_itself(tmp_path):
+    nodes = [(f"bone{n}", parent, place) for n, (_, parent, place) in enumerate(rig())]
+    humanoid = {}
+    for n, (name, _, _) in enumerate(rig()):
+        for side in ("Left", "Right"):
+            if name == f"{side}Hand":
+                humanoid[f"{side.lower()}Hand"] = {"node": n}
+            for word in WORDS:
+                parts = (
+                    ("Metacarpal", "Proximal", "Distal") if word == "Thumb" else ("Proximal", "Intermediate", "Distal")
+                )
+                for k, part in enumerate(parts):
+                    if name == f"{side}Hand{word}{k + 1}":
+                        humanoid[f"{side.lower()}{word.replace('Pinky', 'Little')}{part}"] = {"node": n}
+    file = write_glb(tmp_path / "avatar.vrm", nodes, extensions={"VRMC_vrm": {"humanoid": {"humanBones": humanoid}}})
+    same_hand(import_profile(file, "a", MODEL, lambda _: None), "right")
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (100.0, "centimetres"), (10.0, "decimetres")])
+def test_the_unit_of_a_bvh_file_is_guessed_and_said(tmp_path, scale, unit):
+    said = []
+    profile = import_profile(write_bvh(tmp_path / "a.bvh", rig(scale)), "a", MODEL, said.append)
+    same_hand(profile, "left")
+    assert any(unit in line for line in said)
+
+
+def test_a_map_by_hand_replaces_the_names(tmp_path):
+    nodes = [(f"b{n}", parent, place) for n, (_, parent, place) in enumerate(rig(sides=("right",)))]
+    joints = ["wrist"]
+    joints += [f"thumb_{part}" for part in ("metacarpal", "proximal", "distal", "tip")]
+    joints += [
+        f"{f}_{p}" for f in ("index", "middle", "ring", "little") for p in ("proximal", "intermediate", "distal", "tip")
+    ]
+    table = {"right": {joint: f"b{n + 1}" for n, joint in enumerate(joints)}}
+    (tmp_path / "map.json").write_text(json.dumps(table))
+    profile = import_profile(write_glb(tmp_path / "a.glb", nodes), "a", MODEL, lambda _: None, tmp_path / "map.json")
+    same_hand(profile, "right")
+    for wrong, reason in (
+        ({"right": {"elbow": "b1"}}, "no joint 'elbow'"),
+        ({"right": {"wrist": "x"}}, "no bone 'x'"),
+        ({}, "must be"),
+        ({"right": {"thumb_tip": "b1"}}, "no wrist"),
+    ):
+        (tmp_path / "map.json").write_text(json.dumps(wrong))
+        with pytest.raises(RigFileError, match=reason):
+            import_profile(tmp_path / "a.glb", "a", MODEL, lambda _: None, tmp_path / "map.json")
+
+
+def test_a_hand_without_bones_at_its_tips_is_guessed_and_said(tmp_path):
+    said = []
+    import_profile(write_glb(tmp_path / "a.glb", rig(tips=False)), "a", MODEL, said.append)
+    assert sum("guessed" in line for line in said) == 10
+
+
+def test_three_fingers_are_enough(tmp_path):
+    profile = import_profile(write_glb(tmp_path / "a.glb", rig(fingers=3)), "a", MODEL, lambda _: None)
+    assert np.isnan(profile.hands["left"].joints[list(FINGERS[4]), 0]).all()
+
+
+@pytest.mark.parametrize(
+    ("nodes", "reason"),
+    [
+        (rig(name="x{side}{word}{n}x"), "no finger bones are recognised"),
+        (rig(flip=True), "mirrored"),
+        (rig(scale=0.01), "multiply its positions by 100"),
+    ],
+    ids=["without fingers", "mirrored", "scale 0.01"],
+)
+def test_a_rig_that_cannot_be_used_is_refused_with_the_remedy(tmp_path, nodes, reason):
+    with pytest.raises((RigFileError, ProfileError), match=reason):
+        import_profile(write_glb(tmp_path / "a.glb", nodes), "a", MODEL, lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"), [("a.fbx", b""), ("a.glb", b"nothing"), ("a.bvh", b"nothing"), ("b.glb", None)]
+)
+def test_a_file_that_cannot_be_read_is_named(tmp_path, name, content):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(RigFileError, match=name):
+        import_profile(tmp_path / name, "a", MODEL, lambda _: None)
+
+
+def test_the_command_writes_a_profile_and_a_picture(tmp_path, capsys):
+    file, out = write_glb(tmp_path / "my avatar.glb", rig()), tmp_path / "hand.json"
+    assert main(["hand", "import", str(file), "--out", str(out)]) == 0
+    assert read_profile(out).name == "my-avatar"
+    assert out.with_suffix(".png").stat().st_size > 10_000
+    assert "hand bone LeftHand" in capsys.readouterr().out
+    assert main(["hand", "show", str(tmp_path / "absent.json"), "--out", str(tmp_path / "x.png")]) == 1
+    assert "cannot be read" in capsys.readouterr().err

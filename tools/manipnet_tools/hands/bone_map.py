@@ -1,0 +1,89 @@
+"""Which bone of a rig is which OpenXR joint: by the vocabulary of names, or by a map that a user writes."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+from manipnet.geometry import SIDES, Side
+from manipnet.synthesis.hand.profile import FINGERS
+from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, WEBXR_JOINT_NAMES
+from manipnet.wire.rig_names import find_bones
+from manipnet_tools.hands.rig_file import RigFileError, Skeleton
+
+JOINTS: Final = {name: k for k, name in enumerate(OPENXR_JOINT_NAMES)}
+BoneMap = dict[int, int]
+"""The bone of each OpenXR joint that a rig has, by number."""
+
+
+def map_bones(skeleton: Skeleton, where: str) -> dict[Side, BoneMap]:
+    """The hands of a rig, by the names of its bones. Raises `RigFileError` if there is none."""
+    number = {name: k for k, name in reversed(list(enumerate(skeleton.names)))}
+    webxr = {
+        JOINTS[OPENXR_JOINT_NAMES[k + 1]]: number[name] for k, name in enumerate(WEBXR_JOINT_NAMES) if name in number
+    }
+    if len(webxr) > 5:
+        return {_side_of(where): webxr}
+    hands: dict[Side, BoneMap] = {}
+    for side, bones in find_bones(skeleton.names).items():
+        if not any(finger for finger, _ in bones.fingers):
+            continue
+        found = {FINGERS[f][part + (f > 0)]: number[name] for (f, part), name in bones.fingers.items()}
+        found |= {FINGERS[f][0]: number[name] for f, name in bones.metacarpals.items()}
+        hand = number.get(bones.hand or "")
+        hands[side] = found | {1: _common_parent(skeleton, found) if hand is None else hand}
+    if not hands:
+        raise RigFileError(
+            f"{where}: no finger bones are recognised among {', '.join(skeleton.names[:12])}"
+            f"{' …' * (len(skeleton.names) > 12)}; rename them, or say which is which with --map"
+        )
+    return hands
+
+
+def read_map(path: Path, skeleton: Skeleton) -> dict[Side, BoneMap]:
+    """A map from a JSON file `{"left"|"right": {OpenXR joint: name of a bone}}`. Raises `RigFileError`."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RigFileError(f"{path}: is not a JSON file ({error})") from None
+    if not isinstance(content, Mapping) or not content or not all(side in SIDES for side in content):
+        raise RigFileError(f'{path}: must be {{"left": {{joint: bone}}, "right": {{joint: bone}}}}')
+    hands: dict[Side, BoneMap] = {}
+    for side in SIDES:
+        if side in content:
+            hands[side] = {_joint(path, name): _bone(path, bone, skeleton) for name, bone in content[side].items()}
+            if JOINTS["wrist"] not in hands[side]:
+                raise RigFileError(f"{path}: {side} has no wrist; give the bone of the hand as wrist")
+    return hands
+
+
+def _joint(path: Path, name: str) -> int:
+    if name not in JOINTS:
+        raise RigFileError(f"{path}: there is no joint {name!r}; the joints are {', '.join(JOINTS)}")
+    return JOINTS[name]
+
+
+def _bone(path: Path, bone: object, skeleton: Skeleton) -> int:
+    if bone not in skeleton.names:
+        raise RigFileError(f"{path}: the rig has no bone {bone!r}; its bones are {', '.join(skeleton.names)}")
+    return skeleton.names.index(str(bone))
+
+
+def _side_of(where: str) -> Side:
+    """The side of a file that holds one hand, by its name."""
+    name = Path(where).stem.lower()
+    side: Side | None = "left" if "left" in name else "right" if "right" in name else None
+    if side is None:
+        raise RigFileError(f"{where}: holds one hand, but its name does not say which; name it left.glb or right.glb")
+    return side
+
+
+def _common_parent(skeleton: Skeleton, found: BoneMap) -> int:
+    """The deepest bone that all fingers hang on, for a rig whose hand has an unknown name."""
+    chains = []
+    for bone in found.values():
+        chain = [bone]
+        while skeleton.parents[chain[-1]] >= 0:
+            chain.append(skeleton.parents[chain[-1]])
+        chains.append(chain)
+    return next(bone for bone in chains[0][1:] if all(bone in chain for chain in chains))

@@ -1,0 +1,90 @@
+"""`manipnet hand`: makes, draws and checks the hand profile of an avatar."""
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from manipnet.config.files import require_file
+from manipnet.synthesis.hand.profile import profile_to_json, read_profile
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.providers import DEFAULT_MODEL
+
+EPILOG = """examples:
+  manipnet hand import avatar.vrm --out hand.json            make a profile, and hand.png that shows it
+  manipnet hand import avatar.glb --map bones.json --out hand.json
+  manipnet hand show hand.json --out hand.png
+  manipnet hand check hand.json takes/mug1 --mesh mug1=mug1.obj
+A map is a JSON file {"left": {"wrist": "Hand_L", "index_proximal": "Finger1_L", …}, "right": {…}}."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Do what the arguments say. Returns the exit status; raises `ValueError`s of the package for a wrong file."""
+    options = _parser().parse_args(argv)
+    options.do(options)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="manipnet hand",
+        description="Make, draw and check the profile of an avatar's hand, on which the server then solves contact.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    take_in = verbs.add_parser("import", help="make a profile from the rig of an avatar")
+    take_in.add_argument("avatar", type=Path, metavar="AVATAR", help="the avatar: .glb, .vrm or .bvh")
+    take_in.add_argument("--map", type=Path, metavar="FILE", help="JSON file that says which bone is which joint")
+    take_in.add_argument("--name", help="name of the profile (default: that of the avatar's file)")
+    take_in.add_argument("--out", type=Path, required=True, metavar="HAND.json", help="the file to write")
+    take_in.set_defaults(do=_import)
+    show = verbs.add_parser("show", help="draw a profile")
+    show.add_argument("hand", type=Path, metavar="HAND.json")
+    show.add_argument("--out", type=Path, required=True, metavar="FILE.png", help="the picture to write")
+    show.set_defaults(do=_show)
+    check = verbs.add_parser("check", help="measure on a take how much contact survives on the hand")
+    check.add_argument("hand", type=Path, metavar="HAND.json")
+    check.add_argument("take", type=Path, metavar="TAKE", help="the take, as for `manipnet synthesize`")
+    check.add_argument("--mesh", action="append", default=[], metavar="NAME=FILE", help="an object and its mesh")
+    check.add_argument("--model", default=DEFAULT_MODEL, metavar="NAME", help="the model (default: %(default)s)")
+    check.add_argument("--drop", action="store_true", help="also let a simulator drop the object (extra judge)")
+    check.set_defaults(do=_check)
+    return parser
+
+
+def _import(options: argparse.Namespace) -> None:
+    from manipnet.synthesis.model.shipped import shipped_hand
+    from manipnet_tools.hands.importing import import_profile
+
+    name = options.name or re.sub(r"[\s/]+", "-", options.avatar.stem)
+    profile = import_profile(options.avatar, name, shipped_hand(), print, options.map)
+    options.out.write_text(profile_to_json(profile), encoding="utf-8")
+    print(f"wrote {options.out}")
+    _draw(options.out, options.out.with_suffix(".png"))
+
+
+def _show(options: argparse.Namespace) -> None:
+    _draw(options.hand, options.out)
+
+
+def _draw(hand: Path, out: Path) -> None:
+    from manipnet_tools.hands.drawing import draw_profile
+    from manipnet_tools.rendering import save_png
+
+    bundle = load_bundle()
+    save_png(draw_profile(read_profile(hand), bundle.hand, bundle.rest_angles), out)
+    print(f"wrote {out}: left and right hand straight and bent, and below them the model's hand; bars are hinges")
+
+
+def _check(options: argparse.Namespace) -> None:
+    from manipnet_tools.hands.check import check_profile
+
+    require_file(options.hand)
+    for line in check_profile(read_profile(options.hand), options.take, options.mesh, options.model, options.drop):
+        print(line)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,72 @@
+"""Reads the skeleton of an avatar from a glTF Binary, VRM or BVH file."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from manipnet.geometry import Array
+from manipnet.synthesis.objects.glb import read_glb_rig
+from manipnet.synthesis.objects.glb_accessors import GlbError
+from manipnet_tools.takes.bvh_motion import BvhError, read_bvh
+
+SUFFIXES: Final = (".glb", ".vrm", ".bvh")
+
+
+class RigFileError(ValueError):
+    """A hand cannot be imported from a file; the text names the file, the reason and the remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """The bones of a rig at rest, in the units of the file."""
+
+    names: list[str]
+    parents: list[int]
+    heads: Array
+    """`(B, 3)` where each bone begins."""
+    ends: dict[int, Array]
+    """Where bones without children end, as far as the file says so."""
+    vertices: Array
+    """`(V, 3)`; none in a BVH file."""
+    owners: NDArray[np.int64]
+    """`(V,)` the bone that moves each vertex most."""
+    in_metres: bool
+    """Whether the format has metres as its unit."""
+
+    def children(self, bone: int) -> list[int]:
+        """The bones that hang on a bone."""
+        return [k for k, parent in enumerate(self.parents) if parent == bone]
+
+
+def read_skeleton(path: Path) -> Skeleton:
+    """Read a rig. Raises `RigFileError`."""
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise RigFileError(f"{path}: must end in {', '.join(SUFFIXES)}; export the avatar as glTF Binary (.glb)")
+    try:
+        return _from_bvh(path) if suffix == ".bvh" else _from_glb(path)
+    except GlbError as error:
+        raise RigFileError(f"{path}: {error}") from None
+    except BvhError as error:
+        raise RigFileError(str(error)) from None
+    except OSError as error:
+        raise RigFileError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def _from_glb(path: Path) -> Skeleton:
+    rig = read_glb_rig(path.read_bytes())
+    return Skeleton(rig.names, rig.parents, rig.positions, {}, rig.vertices, rig.owners, in_metres=True)
+
+
+def _from_bvh(path: Path) -> Skeleton:
+    joints = read_bvh(path).joints
+    heads = np.zeros((len(joints), 3))
+    for k, joint in enumerate(joints):
+        heads[k] = np.array(joint.offset) + (heads[joint.parent] if joint.parent >= 0 else 0.0)
+    ends = {k: heads[k] + np.array(joint.end) for k, joint in enumerate(joints) if joint.end is not None}
+    none = np.empty((0, 3)), np.empty(0, np.int64)
+    names, parents = [joint.name for joint in joints], [joint.parent for joint in joints]
+    return Skeleton(names, parents, heads, ends, *none, in_metres=False)
