@@ -46,7 +46,7 @@ EXTRAS = named([one for extra in PINNED_EXTRAS.values() for one in extra])
 
 
 OPTIONAL = {"dracopy", "pylsl"}
-"""Libraries that a plain install lacks: they are used where they are, and otherwise an error says how to install them."""
+"""Libraries that a plain install lacks: where they are needed and missing, an error says how to install them."""
 
 
 def test_the_server_imports_only_what_a_plain_install_brings():
