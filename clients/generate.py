@@ -66,6 +66,7 @@ NAMES = {
 VERSION_KEYS = {
     "blender/manipnet_live/blender_manifest.toml": "version",
     "python/pyproject.toml": "version",
+    "python/manipnet_client/__init__.py": "__version__",
     "unity/com.manipnet.client/package.json": '"version"',
     "unreal/ManipNetLiveLink/ManipNetLiveLink.uplugin": '"VersionName"',
     "web/package.json": '"version"',

@@ -1,12 +1,15 @@
-// Shows both hands as spheres at their WebXR joints with lines along the bones, and the tracked bodies. The stream has
-// the axes of three.js: right-handed, Y up, metres. `?server=ws://HOST:PORT` names another server.
+// Shows both hands as skin over their WebXR joints, and the tracked bodies. The stream has the axes of three.js:
+// right-handed, Y up, metres. `?server=ws://HOST:PORT` names another server, `#token=…` its token (which, after #, is not
+// sent to the server of the page), and `?mesh=BODY=FILE.obj` the mesh of a body, in metres, once for each body.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import { JOINT_PARENTS, ManipNetClient } from "./manipnet.js";
+import { OBJLoader } from "three/addons/loaders/OBJLoader.js";
+import { JOINT_NAMES, JOINT_PARENTS, ManipNetClient } from "./manipnet.js";
 
 const SIDES = { left: 0x6fb1ff, right: 0xffa46f };
-const server = new URLSearchParams(location.search).get("server") ?? "ws://127.0.0.1:8081";
-const client = new ManipNetClient(server);
+const parameters = new URLSearchParams(location.search);
+const server = parameters.get("server") ?? "ws://127.0.0.1:8081";
+const client = new ManipNetClient(server, { token: new URLSearchParams(location.hash.slice(1)).get("token") });
 const status = document.getElementById("status");
 
 const renderer = new THREE.WebGLRenderer({ antialias: true });
@@ -23,54 +26,91 @@ controls.target.set(0, 1, 0);
 const hands = Object.fromEntries(Object.entries(SIDES).map(([side, color]) => [side, makeHand(color)]));
 const bodies = new Map();
 let hasLooked = false;
+let problem = "";
 
+/** A ball at each joint and a limb along each bone; the palm is a limb to each knuckle. */
 function makeHand(color) {
   const material = new THREE.MeshStandardMaterial({ color, roughness: 0.6 });
-  const joints = new THREE.InstancedMesh(new THREE.SphereGeometry(0.007, 16, 12), material, JOINT_PARENTS.length);
-  const lines = new THREE.BufferGeometry();
-  lines.setAttribute("position", new THREE.BufferAttribute(new Float32Array(6 * JOINT_PARENTS.length), 3));
-  const bones = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color }));
-  joints.frustumCulled = bones.frustumCulled = false;
+  const joints = new THREE.InstancedMesh(new THREE.SphereGeometry(1, 16, 12), material, JOINT_PARENTS.length);
+  const limbs = new THREE.InstancedMesh(new THREE.CylinderGeometry(1, 1, 1, 12), material, JOINT_PARENTS.length);
+  joints.frustumCulled = limbs.frustumCulled = false;
   const group = new THREE.Group();
-  group.add(joints, bones);
+  group.add(joints, limbs);
   scene.add(group);
-  return { group, joints, bones };
+  return { group, joints, limbs };
 }
 
 const matrix = new THREE.Matrix4();
+const [start, end, middle, size] = [0, 1, 2, 3].map(() => new THREE.Vector3());
+const up = new THREE.Vector3(0, 1, 0);
+const turn = new THREE.Quaternion();
 
-function showHand({ group, joints, bones }, hand, weight) {
+/** Radii in metres: tips are thinner than knuckles, and the wrist is thickest. */
+function radius(joint) {
+  if (joint < 2) return 0.016;
+  return JOINT_NAMES[joint].endsWith("tip") ? 0.006 : JOINT_NAMES[joint].includes("metacarpal") ? 0.011 : 0.0085;
+}
+
+function showHand({ group, joints, limbs }, hand, weight) {
   group.visible = hand.present && weight > 0;
   if (!group.visible) return;
-  const ends = bones.geometry.attributes.position;
   for (let i = 0; i < JOINT_PARENTS.length; i++) {
-    const [x, y, z] = hand.joints.subarray(7 * i, 7 * i + 3);
-    joints.setMatrixAt(i, matrix.makeTranslation(x, y, z));
-    const from = 7 * Math.max(JOINT_PARENTS[i], 1);
-    ends.setXYZ(2 * i, hand.joints[from], hand.joints[from + 1], hand.joints[from + 2]);
-    ends.setXYZ(2 * i + 1, x, y, z);
+    const r = radius(i) * hand.scale;
+    end.fromArray(hand.joints, 7 * i);
+    start.fromArray(hand.joints, 7 * Math.max(JOINT_PARENTS[i], 1));
+    joints.setMatrixAt(i, matrix.compose(end, turn.identity(), size.setScalar(r)));
+    middle.addVectors(start, end).multiplyScalar(0.5);
+    const length = start.distanceTo(end);
+    turn.setFromUnitVectors(up, end.sub(start).normalize());
+    limbs.setMatrixAt(i, matrix.compose(middle, turn, size.set(r, length, r)));
   }
-  joints.instanceMatrix.needsUpdate = ends.needsUpdate = true;
+  joints.instanceMatrix.needsUpdate = limbs.instanceMatrix.needsUpdate = true;
 }
 
 function showBody(body) {
   if (!bodies.has(body.name)) {
-    bodies.set(body.name, new THREE.AxesHelper(0.06));
+    bodies.set(body.name, makeBody(body.name));
     scene.add(bodies.get(body.name));
   }
-  const axes = bodies.get(body.name);
-  axes.visible = body.tracked;
-  axes.position.fromArray(body.pose);
-  axes.quaternion.fromArray(body.pose, 3);
+  const shown = bodies.get(body.name);
+  shown.visible = body.tracked;
+  shown.position.fromArray(body.pose);
+  shown.quaternion.fromArray(body.pose, 3);
 }
 
-/** Points the camera at the hands once, because the origin may be far from them. */
+/** Axes, and the mesh that the page's address names for the body. */
+function makeBody(name) {
+  const group = new THREE.Group();
+  group.add(new THREE.AxesHelper(0.06));
+  const file = parameters.getAll("mesh").find((each) => each.startsWith(`${name}=`));
+  if (file !== undefined) {
+    const material = new THREE.MeshStandardMaterial({ color: 0xb8c0cc, roughness: 0.8 });
+    new OBJLoader().load(
+      file.slice(name.length + 1),
+      (mesh) => {
+        mesh.traverse((part) => (part.material = material));
+        group.add(mesh);
+      },
+      undefined,
+      (error) => (problem = `the mesh of ${name} cannot be loaded: ${error.message ?? error}`),
+    );
+  }
+  return group;
+}
+
+/** Points the camera at all hands once, because the origin may be far from them, from where both fit into the page. */
 function lookAtHands({ left, right }) {
-  const hand = left.present ? left : right;
-  if (hasLooked || !hand.present) return;
+  const present = [left, right].filter((hand) => hand.present);
+  if (hasLooked || present.length === 0) return;
   hasLooked = true;
-  controls.target.fromArray(hand.wrist);
-  camera.position.copy(controls.target).add(new THREE.Vector3(-0.1, 0.3, 0.55));
+  const box = new THREE.Box3();
+  for (const hand of present) {
+    for (let i = 0; i < JOINT_PARENTS.length; i++) box.expandByPoint(end.fromArray(hand.joints, 7 * i));
+  }
+  box.getCenter(controls.target);
+  const radius = 0.5 * box.getSize(size).length() + 0.05;
+  const half = Math.min(1, camera.aspect) * Math.tan((camera.fov * Math.PI) / 360);
+  camera.position.copy(controls.target).add(middle.set(-0.16, 0.48, 0.86).multiplyScalar((1.2 * radius) / half));
 }
 
 function describe() {
@@ -82,7 +122,7 @@ function describe() {
     return `${side}: ${state}${object ? `, ${object}` : ""}`;
   });
   const age = `age ${(1000 * s.ageS).toFixed(0)} ms`;
-  return [`${s.state} · ${s.rateHz.toFixed(1)} Hz · ${age} · ${s.lost} lost`, ...states].join("\n");
+  return [`${s.state} · ${s.rateHz.toFixed(1)} Hz · ${age} · ${s.lost} lost`, ...states, problem].join("\n");
 }
 
 function resize() {
@@ -102,6 +142,7 @@ function draw() {
   renderer.render(scene, camera);
 }
 
+globalThis.client = client; // for the console
 addEventListener("resize", resize);
 setInterval(() => (status.textContent = describe()), 250);
 resize();

@@ -16,10 +16,13 @@ export { ANGLE_NAMES, BONE_NAMES, JOINT_NAMES, JOINT_PARENTS } from "./layout.js
 const BACK_OFF_MS = 100;
 const BACK_OFF_LIMIT_MS = 1000;
 const DEAD_AFTER_MS = 5000;
+const SUBPROTOCOL = "manipnet";
 
 /** Receives the hands of one actor (the first one received, if none is named) and reconnects by itself. */
 export class ManipNetClient {
   #address;
+  #protocols;
+  #WebSocket;
   #actor;
   #interpolator;
   #socket = null;
@@ -35,12 +38,21 @@ export class ManipNetClient {
   #newestAt = -Infinity;
   #counts = { state: "connecting", received: 0, lost: 0, refused: 0, connections: 0 };
 
-  /** `address` is "ws://HOST:PORT", from the server's line `ready`. Throws an Error for any other form. */
-  constructor(address, { actor = null, delayS = 0.1 } = {}) {
+  /**
+   * `address` is "ws://HOST:PORT" from the server's line `ready`, or "wss://…" behind a proxy with TLS. Throws an Error
+   * for any other form. `token` is the one of the server's --web-token. `WebSocket` is the class of the sockets, for
+   * programs without one of their own, such as node before version 22.
+   */
+  constructor(address, { actor = null, delayS = 0.1, token = null, WebSocket = globalThis.WebSocket } = {}) {
     if (!/^wss?:\/\/[^/]+/.test(address)) {
       throw new Error(`the address is "${address}"; allowed is ws://HOST:PORT, as in ws://127.0.0.1:8081`);
     }
+    if (typeof WebSocket !== "function") {
+      throw new Error("there is no WebSocket here; pass one, as in new ManipNetClient(address, { WebSocket })");
+    }
     this.#address = address;
+    this.#protocols = token === null ? [] : [SUBPROTOCOL, `${SUBPROTOCOL}.token.${token}`];
+    this.#WebSocket = WebSocket;
     this.#actor = actor;
     this.#interpolator = new Interpolator(delayS);
     this.#watch = setInterval(() => this.#checkAlive(), 500);
@@ -82,7 +94,7 @@ export class ManipNetClient {
 
   #connect() {
     this.#receivedMs = performance.now();
-    const socket = new WebSocket(this.#address);
+    const socket = new this.#WebSocket(this.#address, this.#protocols);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.#receivedMs = performance.now();

@@ -47,7 +47,7 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "bodies_rejected": ("reason", BODY_REASONS),
     "sender_restarts": ("source", ()),
     "receiver_restarts": ("source", ()),
-    "connections_refused": ("reason", ("handshake", "socket_type", "not_listed", "too_many", "endless")),
+    "connections_refused": ("reason", ("handshake", "socket_type", "not_listed", "too_many", "endless", "token")),
     "hand_ticks": ("state", ("live", "hold", "rest")),
     "ticks_skipped": ("reason", ("backlog", "restart")),
     "tick_errors": ("stage", ("input", "plan", "synthesis", "show", "publish", "avatar")),

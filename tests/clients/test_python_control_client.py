@@ -129,6 +129,17 @@ def test_only_keys_need_pyzmq(control, keys, monkeypatch):
         ControlClient("tcp://127.0.0.1:5557", keys=keys / "listed.toml")
 
 
+def test_requests_as_methods(control):
+    assert 0.0 < control.look_ahead(0.2) <= 0.5
+    name = control.record("by the client")
+    assert name.startswith("by")
+    assert control.stop_recording()["name"] == name
+    shape = control.ask("objects")["objects"][0]
+    assert control.select_object("Box", shape, 0.9)["scale"] == 0.9
+    with pytest.raises(RequestError, match="object"):
+        control.select_object("Box", "nothing of this name")
+
+
 def test_csharp_control_client_does_the_same(server, harness):
     """The client of the Unity package, on a real server."""
     requests = [

@@ -1,15 +1,18 @@
 """Hands over WebSocket: every payload arrives, slow clients get the newest, pages of other sites are refused."""
 
+import os
 import socket
 from contextlib import ExitStack
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
-from websockets.typing import Origin
+from websockets.typing import Origin, Subprotocol
 
+from manipnet.common.options import ConfigError
 from manipnet.net.half_open import MOST_HALF_OPEN
 from manipnet.outputs.websocket.server import MAX_CLIENTS, MAX_REQUESTS, WebSocketPublisher
+from manipnet.outputs.websocket.token import read_token
 from manipnet.telemetry import Telemetry
 
 
@@ -129,3 +132,50 @@ def test_close_twice_and_publish_after():
     host, port = publisher.address.removeprefix("ws://").split(":")
     with pytest.raises(OSError):
         socket.create_connection((host, int(port)), 5)
+
+
+TOKEN = "a-token-of-the-stage_2026"
+
+
+@pytest.fixture
+def guarded(telemetry):
+    publisher = WebSocketPublisher(telemetry, "127.0.0.1", 0, TOKEN)
+    yield publisher
+    publisher.close()
+
+
+def offering(token):
+    return [Subprotocol("manipnet"), Subprotocol(f"manipnet.token.{token}")]
+
+
+@pytest.mark.parametrize("origin", [None, "http://localhost:8000", "https://headset.example"])
+def test_with_a_token_every_page_may_connect_that_shows_it(guarded, origin):
+    with connect(guarded.address, origin=origin, subprotocols=offering(TOKEN)) as connection:
+        assert connection.subprotocol == "manipnet"
+        assert receive(guarded, connection, b"x") == b"x"
+
+
+@pytest.mark.parametrize("offered", [None, [Subprotocol("manipnet")], offering("wrong"), offering(TOKEN[:-1])])
+@pytest.mark.parametrize("origin", [None, "http://localhost:8000"])
+def test_with_a_token_nobody_connects_without_it(guarded, telemetry, offered, origin):
+    with pytest.raises(InvalidStatus, match="401"):
+        connect(guarded.address, origin=origin, subprotocols=offered)
+    assert telemetry.counts() == {"connections_refused": {"token": 1}}
+
+
+def test_a_token_is_read_from_a_private_file(tmp_path):
+    path = tmp_path / "token"
+    path.write_text(TOKEN + "\n")
+    path.chmod(0o600)
+    assert read_token(path) == TOKEN
+    path.chmod(0o644)
+    if os.name == "posix":
+        with pytest.raises(ConfigError, match=f"chmod 600 {path}"):
+            read_token(path)
+    path.chmod(0o600)
+    for text in ("short", "spaces are not allowed in a token", ""):
+        path.write_text(text)
+        with pytest.raises(ConfigError, match="20 to 200 letters"):
+            read_token(path)
+    with pytest.raises(ConfigError, match="cannot read the token"):
+        read_token(tmp_path / "missing")

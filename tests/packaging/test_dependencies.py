@@ -45,8 +45,8 @@ PINNED_EXTRAS = {name: extra for name, extra in PROJECT["optional-dependencies"]
 EXTRAS = named([one for extra in PINNED_EXTRAS.values() for one in extra])
 
 
-OPTIONAL = {"dracopy"}
-"""Libraries that nothing installs: they are used where they are, and otherwise an error says how to install them."""
+OPTIONAL = {"dracopy", "pylsl"}
+"""Libraries that a plain install lacks: where they are needed and missing, an error says how to install them."""
 
 
 def test_the_server_imports_only_what_a_plain_install_brings():

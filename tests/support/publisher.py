@@ -49,6 +49,7 @@ def main() -> None:
     parser.add_argument("--port", type=int, default=0)
     parser.add_argument("--websocket-port", type=int, default=0)
     parser.add_argument("--session", default="s")
+    parser.add_argument("--token", help="the token that the WebSocket asks for")
     parser.add_argument("--rate", type=float, default=RATE_HZ)
     parser.add_argument("--timecode", help="send this timecode, at 29.97 frames per second", metavar="HH:MM:SS:FF")
     parser.add_argument(
@@ -62,7 +63,7 @@ def main() -> None:
     port = options.port or socket.bind_to_random_port("tcp://127.0.0.1")
     if options.port:
         socket.bind(f"tcp://127.0.0.1:{port}")
-    websocket = WebSocketPublisher(Telemetry(), "127.0.0.1", options.websocket_port)
+    websocket = WebSocketPublisher(Telemetry(), "127.0.0.1", options.websocket_port, options.token)
     print(f"ready tcp://127.0.0.1:{port} {websocket.address}", flush=True)
     start = time.monotonic()
     for seq in itertools.count():

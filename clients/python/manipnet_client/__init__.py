@@ -12,6 +12,8 @@ from .interpolation import Interpolator, Shown
 from .message import Body, Hand, Hands, MessageError, decode
 from .zmtp import parse_address
 
+__version__ = "0.1.0"
+
 __all__ = [
     "Body",
     "Client",

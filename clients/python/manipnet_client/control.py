@@ -55,6 +55,23 @@ class ControlClient:
             raise RequestError(reply["error"])
         return reply
 
+    def select_object(self, body: str, object: str, scale: float = 1.0, actor: str | None = None) -> dict[str, Any]:
+        """Let a tracked body carry an object of the server; returns the selection now in force. Raises as `ask`."""
+        chosen = {} if actor is None else {"actor": actor}
+        return self.ask("select_object", body=body, object=object, scale=scale, **chosen)
+
+    def look_ahead(self, seconds: float) -> float:
+        """Set how much future motion the synthesis waits for; returns the seconds now in force. Raises as `ask`."""
+        return self.ask("look_ahead", seconds=seconds)["seconds"]
+
+    def record(self, name: str | None = None) -> str:
+        """Begin a recording on the server's machine; returns its name. Raises as `ask`."""
+        return self.ask("record", **({} if name is None else {"name": name}))["name"]
+
+    def stop_recording(self) -> dict[str, Any]:
+        """End the recording; returns its name, its seconds and what is in it. Raises as `ask`."""
+        return self.ask("stop_recording")
+
     def upload_hand(self, profile: dict[str, Any], actor: str | None = None) -> str:
         """Upload the hands of an avatar and return the name to pass to `Client` as `hand`.
 

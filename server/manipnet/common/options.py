@@ -137,6 +137,13 @@ class Folder(Kind):
         return str(value.resolve())
 
 
+class File(Folder):
+    """The path of a file. In a rig file, a relative path starts at the file's own folder."""
+
+    metavar = "FILE"
+    allowed = "the path of a file, as text"
+
+
 @dataclass(frozen=True)
 class HostPort(Kind):
     """The address of another program, with a default port."""
@@ -251,7 +258,7 @@ class Protocol:
     summary: str
     """A few words on who uses it, and how."""
     options: type
-    """The dataclass of its options. The first one is the port to listen on, or the other program's address."""
+    """The dataclass of its options. The first one is the port to listen on, the other program's address or a switch."""
     ready_name: str = field(default="", kw_only=True)
     """Its name in the `ready` line and in the request `status`, if that is not `name`."""
 
@@ -267,13 +274,16 @@ class Protocol:
 
     @property
     def default_port(self) -> int | None:
-        """The port that it uses unless an option says otherwise."""
+        """The port that it uses unless an option says otherwise; None for a protocol that chooses its own."""
         kind = self.where.kind
+        if isinstance(kind, Switch):
+            return None
         return kind.default_port if isinstance(kind, HostPort) else self.where.default
 
     def is_on(self, options: Any) -> bool:
         """Whether an instance of its options turns it on."""
-        return getattr(options, self.where.field) is not None
+        value = getattr(options, self.where.field)
+        return value is not None and value is not False
 
 
 def option(default: Any, kind: Kind, help: str, *, key: str = "", group: str = "") -> Any:

@@ -7,11 +7,12 @@ from manipnet.common.options import ConfigError
 from manipnet.net.errors import ListenError
 from manipnet.outputs.declaration import Emission, HandsOutput, Output
 from manipnet.outputs.livelink import LIVELINK
+from manipnet.outputs.lsl import LSL
 from manipnet.outputs.vmc import VMC
 from manipnet.outputs.websocket import WEBSOCKET
 from manipnet.outputs.zeromq import ZEROMQ
 
-OUTPUTS: tuple[Output, ...] = (ZEROMQ, WEBSOCKET, VMC, LIVELINK)
+OUTPUTS: tuple[Output, ...] = (ZEROMQ, WEBSOCKET, VMC, LIVELINK, LSL)
 """A new protocol takes one file or folder in this package, and one entry in this tuple."""
 
 

@@ -39,7 +39,12 @@ def inputs_table() -> str:
 def outputs_table() -> str:
     """Every protocol that sends hands, its port and its option."""
     rows = [
-        (each.summary, str(each.default_port), f"`{each.where.flag}`", ", ".join(f"`{label}`" for label in each.labels))
+        (
+            each.summary,
+            str(each.default_port or "-"),
+            f"`{each.where.flag}`",
+            ", ".join(f"`{label}`" for label in each.labels),
+        )
         for each in outputs.OUTPUTS
     ]
     return _table(("protocol", "default port", "option", "counted as"), rows)

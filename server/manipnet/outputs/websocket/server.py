@@ -5,14 +5,18 @@ import contextlib
 import re
 import threading
 from collections import deque
+from collections.abc import Sequence
+from http import HTTPStatus
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
-from websockets.typing import Origin
+from websockets.http11 import Request, Response
+from websockets.typing import Origin, Subprotocol
 
 from manipnet.net.errors import cannot_listen
 from manipnet.net.half_open import BACKLOG, HalfOpen, handshake_log
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
+from manipnet.outputs.websocket.token import SUBPROTOCOL, shows_token
 from manipnet.telemetry import Telemetry
 
 MAX_CLIENTS = 32
@@ -34,9 +38,12 @@ _POLICY_VIOLATION, _TRY_AGAIN_LATER = 1008, 1013
 class WebSocketPublisher(HandsOutput):
     """Serves on a thread of its own, from its creation until `close`."""
 
-    def __init__(self, telemetry: Telemetry, host: str, port: int) -> None:
-        """Bind the port, of which 0 takes any free one. Raises `ListenError`."""
-        self._telemetry = telemetry
+    def __init__(self, telemetry: Telemetry, host: str, port: int, token: str | None = None) -> None:
+        """Bind the port, of which 0 takes any free one. Raises `ListenError`.
+
+        With a `token`, pages of every origin may connect, and every page and program must show it.
+        """
+        self._telemetry, self._token = telemetry, token
         self._clients: dict[asyncio.Event, deque[bytes]] = {}
         self._loop = asyncio.new_event_loop()
         try:
@@ -77,12 +84,14 @@ class WebSocketPublisher(HandsOutput):
         self._loop.close()
 
     async def _serve(self, host: str, port: int):
-        origins: list[Origin | re.Pattern[str] | None] = [None, LOCAL_PAGES]
+        origins: list[Origin | re.Pattern[str] | None] | None = [None, LOCAL_PAGES] if self._token is None else None
         return await serve(
             self._feed,
             host,
             port,
             origins=origins,
+            select_subprotocol=_subprotocol,
+            process_request=self._check,
             compression=None,
             max_size=MAX_REQUEST_BYTES,
             close_timeout=1,
@@ -91,6 +100,12 @@ class WebSocketPublisher(HandsOutput):
             create_connection=HalfOpen(lambda: self._refuse("too_many")).connection,
             logger=handshake_log(__name__),
         )
+
+    def _check(self, connection: ServerConnection, request: Request) -> Response | None:
+        if self._token is None or shows_token(request.headers, self._token):
+            return None
+        self._refuse("token")
+        return connection.respond(HTTPStatus.UNAUTHORIZED, "This server asks for its token (--web-token).\n")
 
     async def _close(self) -> None:
         self._server.close()
@@ -133,3 +148,8 @@ class WebSocketPublisher(HandsOutput):
 
     def _refuse(self, reason: str) -> None:
         self._telemetry.count("connections_refused", reason=reason)
+
+
+def _subprotocol(_: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:
+    """Ours, if the client names it. Older clients name none."""
+    return Subprotocol(SUBPROTOCOL) if SUBPROTOCOL in offered else None
