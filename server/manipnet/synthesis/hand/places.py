@@ -36,14 +36,24 @@ def place_joints(
     places: OpenXrPlaces,
     angles: Array,
     wrist: Array,
+    shift: Array,
     left: bool,
+    moved: Array,
     turns: Array,
     joints: Array,
 ):
-    """Pose a hand with `angles (A,)` at `wrist (7,)`: into `turns (17, 4)`, which lead from the rest pose in the bones'
-    own frames, and `joints (26, 7)` in the world."""
+    """Pose a hand with `angles (A,)` at `wrist (7,)`, moved by `shift (3,)` in the frame of a right hand's wrist.
+
+    It is written into `moved (7,)`, the wrist, `turns (17, 4)`, which lead from the rest pose in the bones' own frames,
+    and `joints (26, 7)` in the world.
+    """
     skeleton, positions, rotations, axes = unpack_skeleton(hand), _positions(), _rotations(), _axes()
     quats, quat, turned, point = _quats(), _quat(), _quat(), vector()
+    for i in range(3):
+        point[i] = -shift[i] if left and i == 0 else shift[i]
+    quat_rotate_into(wrist[3:], point, moved[:3])
+    for i in range(7):
+        moved[i] = moved[i] + wrist[i] if i < 3 else wrist[i]
     forward_kinematics_into(skeleton, angles, positions, rotations, axes)
     for bone in range(len(skeleton.rest)):
         matrix_to_quat_into(rotations[bone], False, quats[bone])
@@ -67,5 +77,5 @@ def place_joints(
             point[0], turned[1], turned[2] = -point[0], -turned[1], -turned[2]
         quat_rotate_into(wrist[3:], point, joints[k, :3])
         for i in range(3):
-            joints[k, i] += wrist[i]
+            joints[k, i] += moved[i]
         multiply_quats_into(wrist[3:], 1.0, turned, joints[k, 3:])
