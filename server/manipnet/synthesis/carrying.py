@@ -91,7 +91,8 @@ class HandCarrier:
         if self._followed is None:
             self._followed = avatar.follow @ model_angles
         if self._held is None:
-            np.clip(avatar.follow @ model_angles, *avatar.hand.limits.T, angles)
+            lower, upper = avatar.hand.limits.T
+            np.clip(avatar.follow @ model_angles, lower, upper, angles)
         else:
             shape, pose, scale = self._held
             carry_contacts(

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manipnet.geometry import SIDES, Array, Side, compose, invert, mirror_poses
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
@@ -167,7 +168,7 @@ def _radii(side: Side, values: Any) -> Array:
     return radii
 
 
-def _duplicates(joints: Array) -> Array:
+def _duplicates(joints: Array) -> NDArray[np.bool_]:
     """Which joints of fingers lie where an earlier joint of the same finger does, `(26,)`."""
     same = np.zeros(_COUNT, np.bool_)
     for finger in FINGERS:
