@@ -33,7 +33,7 @@ ONSET_SHARE: Final = 0.25
 """Share of the way that contact comes in, and goes out, at each tick when an object appears or is lost."""
 PACE_POWER: Final = 2.5
 """Fingers that are longer than the model's follow it more gently, by this power of the ratio of lengths."""
-CALM_POWER: Final = 1.5
+CALM_POWER: Final = 4.0
 """How much more firmly longer fingers are kept to the last tick's difference from the model."""
 _ALONG: Final = (1.0 / 3.0, 2.0 / 3.0, 1.0)
 _ALONG_TIP: Final = (0.25, 0.5, 0.75, 1.0)

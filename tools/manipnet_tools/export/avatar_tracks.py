@@ -10,10 +10,6 @@ from manipnet.geometry import (
     Array,
     Side,
     invert,
-    mirror_quats,
-    quat_conjugate,
-    quat_multiply,
-    quat_to_matrix,
     transform,
 )
 from manipnet.synthesis.carrying import HandCarrier, Held
