@@ -33,6 +33,8 @@ ONSET_SHARE: Final = 0.25
 """Share of the way that contact comes in, and goes out, at each tick when an object appears or is lost."""
 PACE_POWER: Final = 2.5
 """Fingers that are longer than the model's follow it more gently, by this power of the ratio of lengths."""
+RATIOS: Final = (0.75, 1.3)
+"""Ratios of lengths beyond these count as these, or the fingers of a giant would come too late."""
 CALM_POWER: Final = 4.0
 """How much more firmly longer fingers are kept to the last tick's difference from the model."""
 _ALONG: Final = (1.0 / 3.0, 2.0 / 3.0, 1.0)
@@ -69,8 +71,9 @@ class HandCarrier:
         self._touching = 0.0
         self._held: Held | None = None
         self._angles: Array | None = None
-        self._pace = 1.0 / max(avatar.length_ratio, 1.0) ** PACE_POWER
-        self._calm = CALM_WEIGHT_M2 * avatar.length_ratio**CALM_POWER
+        ratio = min(max(avatar.length_ratio, RATIOS[0]), RATIOS[1])
+        self._pace = 1.0 / max(ratio, 1.0) ** PACE_POWER
+        self._calm = CALM_WEIGHT_M2 * ratio**CALM_POWER
         self._signs = mirror_poses(np.ones(7)) if side == "left" else np.ones(7)
         self._followed: Array | None = None
 

@@ -82,6 +82,16 @@ def _turned_back(pose):
     return quat_rotate(quat_conjugate(pose[3:]), pose[:3])
 
 
+def test_turns_that_say_nothing_about_the_back_of_a_finger_are_replaced():
+    own = model_profile(MODEL, "right")
+    joints = own.joints.copy()
+    joints[:, 3:] = quat_exp(np.array([np.pi / 2, 0.0, 0.0]))  # +y along the fingers
+    joints[1, 3:] = [0.0, 0.0, 0.0, 1.0]
+    avatar = avatar_hand(ProfileHand(joints, own.radii), "right", MODEL)
+    pose = HandCarrier(avatar, MODEL, "right").step(np.full(MODEL.angle_count, 0.2), WRIST, None)
+    np.testing.assert_allclose(np.linalg.norm(pose.joints[:, 3:], axis=1), 1.0, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     "missing",
     [

@@ -300,6 +300,8 @@ class _Builder:
 def openxr_frame(along: Array, back: Array) -> Array:
     """Columns of the OpenXR frame of a bone that points `along`, whose back side faces about `back`."""
     z = -_unit(along)
+    if np.linalg.norm(np.cross(back, z)) < 1e-3 * np.linalg.norm(back) + 1e-9:  # no hint: any direction across the bone
+        back = np.eye(3)[np.argmin(np.abs(z))]
     x = _unit(np.cross(back, z))
     return np.stack([x, np.cross(z, x), z], axis=1)
 

@@ -163,7 +163,7 @@ def _radii(side: Side, values: Any) -> Array:
         if not _is_number(value):
             raise ProfileError(f"{where} must be a number, or null if it is unknown, not {_kind(value)}")
         if not RADII_M[0] <= value <= RADII_M[1]:
-            raise ProfileError(f"{where} is {value:.4g} m; allowed are {RADII_M[0]:g} to {RADII_M[1]:g} m")
+            raise ProfileError(f"{where} is {_kind(value)} m; allowed are {RADII_M[0]:g} to {RADII_M[1]:g} m")
         radii[k] = value
     return radii
 
@@ -249,4 +249,6 @@ def _kind(value: Any) -> str:
         return f"a list of {len(value)}"
     if isinstance(value, Mapping):
         return f"a map with {', '.join(map(str, list(value)[:5])) or 'nothing'}"
+    if isinstance(value, int) and abs(value) > _HUGE:
+        return "a huge integer"
     return f"{value!r}"[:40]
