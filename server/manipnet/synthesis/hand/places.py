@@ -28,6 +28,8 @@ class OpenXrPlaces(NamedTuple):
     """`(17,)` the avatar's bone for each of the 17 bones of a message; -1 where it has none."""
     rest: Array
     """`(B, 4)` local rotation of each bone in the profile's rest pose."""
+    own: Array
+    """`(B, 4)` from the frame of each bone to that of its joint in the profile, which need not lie along the bone."""
 
 
 @kernel
@@ -63,7 +65,9 @@ def place_joints(
             turns[k, 0], turns[k, 1], turns[k, 2], turns[k, 3] = 0.0, 0.0, 0.0, 1.0
             continue
         multiply_quats_into(quats[max(skeleton.parents[bone], 0)], -1.0, quats[bone], quat)
-        multiply_quats_into(places.rest[bone], -1.0, quat, turns[k])
+        multiply_quats_into(places.rest[bone], -1.0, quat, turned)
+        multiply_quats_into(places.own[bone], -1.0, turned, quat)
+        multiply_quats_into(quat, 1.0, places.own[bone], turns[k])
         if left:
             turns[k, 1], turns[k, 2] = -turns[k, 1], -turns[k, 2]
     for k in range(len(joints)):
