@@ -8,7 +8,7 @@ from manipnet.actors.actor import Actor
 from manipnet.actors.transitions import ShownHand
 from manipnet.geometry import SIDES
 from manipnet.synthesis.carrying import HandCarrier, Held
-from manipnet.synthesis.hand.avatar import avatar_hand
+from manipnet.synthesis.hand.avatar import AvatarHand, avatar_hand
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.tracking.tick import Tick
@@ -22,7 +22,7 @@ class Avatar:
     def __init__(self, profile: HandProfile, model: Hand) -> None:
         """`model` is the hand that is synthesised."""
         self.profile, self._model = profile, model
-        self._hands = {side: avatar_hand(profile.hands[side], side, model) for side in SIDES}
+        self._hands: dict[Side, AvatarHand] = {side: avatar_hand(profile.hands[side], side, model) for side in SIDES}
         self.restart()
 
     @property
@@ -32,7 +32,9 @@ class Avatar:
 
     def restart(self) -> None:
         """Forget the last tick, after an error that may have spoiled it."""
-        self._carriers = {side: HandCarrier(hand, self._model, side) for side, hand in self._hands.items()}
+        self._carriers: dict[Side, HandCarrier] = {
+            side: HandCarrier(hand, self._model, side) for side, hand in self._hands.items()
+        }
 
     def poses(self, actor: Actor, tick: Tick, shown: Mapping[Side, ShownHand]) -> dict[Side, HandPose]:
         """The avatar's hands for the hands that the actor shows at a tick."""

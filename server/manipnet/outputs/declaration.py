@@ -53,8 +53,11 @@ class HandsOutput:
         """Whether a client has subscribed to the hands of an avatar, by the name of its profile."""
         return False
 
-    def send_avatar(self, hands: EncodedHands) -> None:
-        """Send the hands of an avatar to the clients that want them. Raises `OSError` if they cannot be sent."""
+    def send_avatar(self, message: "HandsMessage") -> None:
+        """Send the hands of an avatar, which `message.hand` names, in the encodings that clients want.
+
+        Raises `OSError` if they cannot be sent, and `MessageError` for a message that breaks the protocol's rules.
+        """
 
     def close(self) -> None:
         """Close the sockets. Does nothing the second time."""

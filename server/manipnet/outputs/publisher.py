@@ -53,11 +53,9 @@ class Publisher:
 
     def publish_avatar(self, message: HandsMessage) -> None:
         """Send the hands of an avatar, which `message.hand` names. Raises `MessageError` as `publish` does."""
-        binary = encode_binary(message)
-        hands = EncodedHands(message, encode_msgpack(message, checked=True), binary)
         for declared, output in self._outputs.items():
             try:
-                output.send_avatar(hands)
+                output.send_avatar(message)
             except OSError as error:
                 _log.warning("%s: an avatar's hands cannot be sent: %s", declared.name, error)
 

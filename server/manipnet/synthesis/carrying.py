@@ -17,13 +17,26 @@ from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.openxr import openxr_frames
 from manipnet.synthesis.hand.places import place_joints
 from manipnet.synthesis.hand.profile import FINGERS
-from manipnet.synthesis.ik.carry import CONTACT_WEIGHT, MAX_SHIFT_M, PAD_WEIGHT, TIP_WEIGHT, Samples, carry_contacts
+from manipnet.synthesis.ik.carry import (
+    CALM_WEIGHT_M2,
+    CONTACT_WEIGHT,
+    MAX_SHIFT_M,
+    PAD_WEIGHT,
+    TIP_WEIGHT,
+    Samples,
+    carry_contacts,
+)
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.wire.hand_names import BONE_NAMES, OPENXR_JOINT_NAMES
 
 ONSET_SHARE: Final = 0.25
 """Share of the way that contact comes in, and goes out, at each tick when an object appears or is lost."""
 PACE_POWER: Final = 2.5
+"""Fingers that are longer than the model's follow it more gently, by this power of the ratio of lengths."""
+RATIOS: Final = (0.75, 1.3)
+"""Ratios of lengths beyond these count as these, or the fingers of a giant would come too late."""
+CALM_POWER: Final = 4.0
+"""How much more firmly longer fingers are kept to the last tick's difference from the model."""
 _ALONG: Final = (1.0 / 3.0, 2.0 / 3.0, 1.0)
 _ALONG_TIP: Final = (0.25, 0.5, 0.75, 1.0)
 _ALONG_PALM: Final = (0.3, 0.65, 1.0)
@@ -58,7 +71,10 @@ class HandCarrier:
         self._touching = 0.0
         self._held: Held | None = None
         self._angles: Array | None = None
-        self._pace = 1.0 / max(avatar.length_ratio, 1.0) ** PACE_POWER
+        ratio = min(max(avatar.length_ratio, RATIOS[0]), RATIOS[1])
+        self._pace = 1.0 / max(ratio, 1.0) ** PACE_POWER
+        self._calm = CALM_WEIGHT_M2 * ratio**CALM_POWER
+        self._signs = mirror_poses(np.ones(7)) if side == "left" else np.ones(7)
         self._followed: Array | None = None
 
     @property
@@ -75,13 +91,11 @@ class HandCarrier:
         self._held = held or self._held
         self._touching += ONSET_SHARE * ((held is not None) - self._touching)
         angles = np.empty(avatar.hand.angle_count)
-        scene = wrist
-        if mirrored:
-            scene = mirror_poses(wrist)
         if self._followed is None:
             self._followed = avatar.follow @ model_angles
         if self._held is None:
-            np.clip(avatar.follow @ model_angles, *avatar.hand.limits.T, angles)
+            lower, upper = avatar.hand.limits.T
+            np.clip(avatar.follow @ model_angles, lower, upper, angles)
         else:
             shape, pose, scale = self._held
             carry_contacts(
@@ -91,8 +105,8 @@ class HandCarrier:
                 avatar.follow,
                 avatar.hand.limits,
                 shape.field,
-                scene,
-                mirror_poses(pose) if mirrored else pose,
+                wrist * self._signs,
+                pose * self._signs,
                 mirrored,
                 float(scale),
                 float(size),
@@ -100,6 +114,7 @@ class HandCarrier:
                 self._max_shift_m,
                 model_angles,
                 self._pace,
+                self._calm,
                 self._followed,
                 self._difference,
                 angles,
@@ -115,10 +130,8 @@ class HandCarrier:
     def _placed(self, wrist: Array) -> AvatarPose:
         avatar, mirrored, angles = self.avatar, self._side == "left", self._angles
         assert angles is not None
-        shift = self._shift * [-1.0, 1.0, 1.0] if mirrored else self._shift
-        moved = np.concatenate([wrist[:3] + quat_rotate(wrist[3:], shift), wrist[3:]])
-        rotations, joints = np.empty((len(BONE_NAMES), 4)), np.empty((len(OPENXR_JOINT_NAMES), 7))
-        place_joints(avatar.hand.packed, avatar.places, angles, moved, mirrored, rotations, joints)
+        moved, rotations, joints = np.empty(7), np.empty((len(BONE_NAMES), 4)), np.empty((len(OPENXR_JOINT_NAMES), 7))
+        place_joints(avatar.hand.packed, avatar.places, angles, wrist, self._shift, mirrored, moved, rotations, joints)
         return AvatarPose(angles, rotations, moved, joints)
 
 

@@ -112,7 +112,7 @@ def find_bones(names: Collection[str]) -> dict[Side, HandBones]:
     for prefix in ("", _prefix(names)):
         for name in names:
             by_plain.setdefault(plain(name.removeprefix(prefix)), name)
-        found = {side: _hand(by_plain, side) for side in SIDES}
+        found: dict[Side, HandBones] = {side: _hand(by_plain, side) for side in SIDES}
         if any(hand.fingers for hand in found.values()):
             return found
     return {side: HandBones(None, {}, {}) for side in SIDES}

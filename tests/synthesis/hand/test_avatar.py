@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from avatar_profiles import scaled_profile
 
-from manipnet.geometry import SIDES, compose, quat_exp
+from manipnet.geometry import SIDES, compose, quat_exp, quat_multiply
 from manipnet.synthesis.carrying import HandCarrier
 from manipnet.synthesis.hand.avatar import OUR_JOINTS, avatar_hand, model_profile
 from manipnet.synthesis.hand.kinematics import forward_kinematics
@@ -57,7 +57,9 @@ def test_any_rest_pose_of_the_fingers_is_undone(side, turns):
 
 @pytest.mark.parametrize("side", SIDES)
 def test_turns_of_the_bones_lead_from_the_rest_pose_to_the_joints(side):
-    profile = scaled_profile(MODEL, 0.9).hands[side]
+    profile, rng = scaled_profile(MODEL, 0.9).hands[side], np.random.default_rng(0)
+    for k in range(2, 26):  # frames that do not lie along the bones
+        profile.joints[k, 3:] = quat_multiply(profile.joints[k, 3:], quat_exp(rng.uniform(-0.2, 0.2, 3)))
     avatar = avatar_hand(profile, side, MODEL)
     pose = HandCarrier(avatar, MODEL, side).step(np.full(MODEL.angle_count, 0.3), WRIST, None)
     np.testing.assert_allclose(bone_lengths(pose.joints), bone_lengths(profile.joints), atol=1e-6)
@@ -80,6 +82,16 @@ def _turned_back(pose):
     from manipnet.geometry import quat_conjugate, quat_rotate
 
     return quat_rotate(quat_conjugate(pose[3:]), pose[:3])
+
+
+def test_turns_that_say_nothing_about_the_back_of_a_finger_are_replaced():
+    own = model_profile(MODEL, "right")
+    joints = own.joints.copy()
+    joints[:, 3:] = quat_exp(np.array([np.pi / 2, 0.0, 0.0]))  # +y along the fingers
+    joints[1, 3:] = [0.0, 0.0, 0.0, 1.0]
+    avatar = avatar_hand(ProfileHand(joints, own.radii), "right", MODEL)
+    pose = HandCarrier(avatar, MODEL, "right").step(np.full(MODEL.angle_count, 0.2), WRIST, None)
+    np.testing.assert_allclose(np.linalg.norm(pose.joints[:, 3:], axis=1), 1.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(

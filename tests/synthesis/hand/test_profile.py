@@ -89,6 +89,7 @@ def mirror(content):
         (changed(lambda c: c["left"]["radii"].pop()), "radii must be a list of 26"),
         (changed(lambda c: c["left"]["radii"].__setitem__(5, -1.0)), r"radius 5 \(thumb_tip\)"),
         (changed(lambda c: c["left"]["radii"].__setitem__(5, float("nan"))), "radius 5"),
+        (changed(lambda c: c["left"]["radii"].__setitem__(5, 10**400)), "radius 5"),
         (changed(lambda c: c.update(left=c["right"])), "this is a right hand"),
         (changed(mirror), "mirrored"),
         (changed(scale(0.01)), "multiply its positions by 100"),

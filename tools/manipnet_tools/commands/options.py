@@ -194,6 +194,8 @@ class ExportOptions:
     """gltf: the mesh of an object, in metres, if the source does not hold it."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor whose hands to write, if a recording has several; by default the first."""
+    hand: Annotated[Path | None, _optional("HAND.json")] = None
+    """Write the hands of this avatar, with contact solved on them, instead of the model's."""
     right_handed: bool = False
     """bvh: write right-handed centimetres, for Blender and Maya, instead of the dataset's left-handed decimetres."""
 
@@ -205,6 +207,7 @@ class ExportOptions:
         suffixes = EXPORT_SUFFIXES.get(self.format, ())
         if suffixes and self.out.suffix.lower() not in suffixes:
             raise ConfigError(f"--out {self.out}: for --format {self.format} it must end in {' or '.join(suffixes)}")
+        require_file(self.hand)
         if self.right_handed and self.format != "bvh":
             raise ConfigError(f"--right-handed is for --format bvh only; {self.format} is always right-handed")
 

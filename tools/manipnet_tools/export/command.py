@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+from manipnet.synthesis.hand.profile import read_profile
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet_tools.commands.options import ExportOptions
 from manipnet_tools.export.animation import Animation, read_animation
+from manipnet_tools.export.avatar_tracks import carry_animation
 from manipnet_tools.export.bvh_out import write_bvh
 from manipnet_tools.export.csv_out import write_csv
 from manipnet_tools.export.gltf_out import write_gltf
@@ -16,7 +18,7 @@ from manipnet_tools.terminal import open_console
 def run(options: ExportOptions) -> None:
     """Read the source, write the files and print what they hold.
 
-    Raises `ExportError`, `TakeError`, `RecordingError`, `MeshError` and `OSError`.
+    Raises `ExportError`, `TakeError`, `RecordingError`, `MeshError`, `ProfileError` and `OSError`.
     """
     console = open_console()
     with console.status(f"reading {options.source}"):
@@ -24,6 +26,8 @@ def run(options: ExportOptions) -> None:
         files = named_files(options.mesh, animation.objects)
         given = {name: load_mesh(file, name=name) for name, file in files.items()}
         animation = replace(animation, meshes=animation.meshes | given)
+        if options.hand is not None:
+            animation = carry_animation(animation, read_profile(options.hand))
     with console.status(f"writing {options.out}"):
         if options.format == "bvh":
             write_bvh(animation, options.out, options.right_handed)

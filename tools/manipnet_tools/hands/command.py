@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from manipnet.config.files import require_file
-from manipnet.synthesis.hand.profile import profile_to_json, read_profile
-from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
+from manipnet_tools.commands.checks import require_take
 
 EPILOG = """examples:
   manipnet hand import avatar.vrm --out hand.json            make a profile, and hand.png that shows it
@@ -55,6 +54,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _import(options: argparse.Namespace) -> None:
+    require_file(options.avatar)
+    from manipnet.synthesis.hand.profile import profile_to_json
     from manipnet.synthesis.model.shipped import shipped_hand
     from manipnet_tools.hands.importing import import_profile
 
@@ -70,6 +71,9 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _draw(hand: Path, out: Path) -> None:
+    require_file(hand)
+    from manipnet.synthesis.hand.profile import read_profile
+    from manipnet.synthesis.model.bundle import load_bundle
     from manipnet_tools.hands.drawing import draw_profile
     from manipnet_tools.rendering import save_png
 
@@ -79,9 +83,11 @@ def _draw(hand: Path, out: Path) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
+    require_file(options.hand)
+    require_take(options.take)
+    from manipnet.synthesis.hand.profile import read_profile
     from manipnet_tools.hands.check import check_profile
 
-    require_file(options.hand)
     for line in check_profile(read_profile(options.hand), options.take, options.mesh, options.model, options.drop):
         print(line)
 

@@ -28,8 +28,9 @@ _GREY = (0.55, 0.57, 0.6)
 
 def draw_profile(profile: HandProfile, model: Hand, rest_angles: Array) -> Image:
     """A sheet of pictures: rows are the hands straight and bent, then the model's hand; columns are three views."""
-    images = []
-    for side, color in (("left", SKIN_LEFT), ("right", SKIN_RIGHT)):
+    images: list[Image] = []
+    colors: dict[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right": SKIN_RIGHT}
+    for side, color in colors.items():
         avatar = avatar_hand(profile.hands[side], side, model)
         for angles in (np.zeros(model.angle_count), rest_angles + _BENT * _bend(model)):
             images += _views(avatar, side, angles, color)

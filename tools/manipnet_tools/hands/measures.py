@@ -69,7 +69,8 @@ def carry_take(
 ) -> tuple[AvatarMotion, AvatarMotion]:
     """The model's hand with `angles (T, A)` at `wrist (T, 7)`, and what is carried onto the avatar's."""
     own = avatar_hand(model_profile(model, side), side, model)
-    _, joints = pose_in_world(model, [side] * len(wrist), angles, wrist, size)
+    sides: list[Side] = [side] * len(wrist)
+    _, joints = pose_in_world(model, sides, angles, wrist, size)
     avatar = avatar_hand(profile.hands[side], side, model)
     carrier = HandCarrier(avatar, model, side)
     carried = [carrier.step(*each, size).joints for each in zip(angles, wrist, held, strict=True)]
@@ -85,7 +86,7 @@ def measure_hand(own: AvatarMotion, avatar: AvatarMotion, shape: Shape, T_world_
     gaps = [metrics.capsule_gaps(m.avatar.hand, m.positions, T_world_object, shape) for m in (own, avatar)]
     last = [gap.gap[:, _last_capsules(m)] for gap, m in zip(gaps, (own, avatar), strict=True)]
     capsules_kept, _ = _kept(last[0], last[1], own, avatar, counts)
-    penetration = tuple(metrics.penetration_cm(gap[counts]) for gap in gaps)
+    penetration = metrics.penetration_cm(gaps[0][counts]), metrics.penetration_cm(gaps[1][counts])
     smooth = [metrics.smoothness_cm_s2(_in_wrist(m), counts) for m in (own, avatar)]
     shift = 1e3 * np.linalg.norm(avatar.joints[:, 1, :3] - own.joints[:, 1, :3], axis=1)
     return HandMeasures(
@@ -112,14 +113,13 @@ def drop_shares(
         frames = frames[np.linspace(0, len(frames) - 1, DROP_FRAMES).round().astype(int)]
     held = np.zeros((2, len(frames)))
     for row, motions in enumerate((own, avatar)):
-        tests = {side: DropTest(shape, m.avatar.hand) for side, m in motions.items()}
+        hand = motions["right"].avatar.hand
+        tests = {count: DropTest(shape, hand, count) for count in (1, 2)}
         for n, frame in enumerate(frames):
-            sides = [side for side in SIDES if touches[side][frame]]
             back = invert(T_world_object[frame])
             down = quat_rotate(back[3:], np.array([0.0, -1.0, 0.0]))
-            joints = [transform(back, motions[side].positions[frame]) for side in sides]
-            test = tests[sides[0]] if len(sides) == 1 else DropTest(shape, motions[sides[0]].avatar.hand, 2)
-            held[row, n] = test.fall(joints, down).held
+            joints = [transform(back, motions[side].positions[frame]) for side in SIDES if touches[side][frame]]
+            held[row, n] = tests[len(joints)].fall(joints, down).held
     return float(held[0].mean()), float(held[1].mean()), len(frames)
 
 

@@ -9,7 +9,7 @@ from manipnet.net.supervised import Pauses, ReceiverHealth
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
 from manipnet.telemetry import Telemetry
-from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, hand_topics
+from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, encode_binary, encode_msgpack, hand_topics
 
 MAX_SUBSCRIPTION_BYTES = 1024
 """Subscriptions, and the handshake of CURVE, are all that clients send."""
@@ -51,19 +51,22 @@ class ZmqPublisher(HandsOutput):
     def wants(self, avatar: str) -> bool:
         """Whether a client has subscribed to a topic of the avatar, or to a prefix of it."""
         self._read_subscriptions()
-        topics = hand_topics(avatar)
-        return any(topic.startswith(prefix) for prefix in self._subscribed for topic in topics)
+        return any(self._is_subscribed(topic) for topic in hand_topics(avatar))
 
-    def send_avatar(self, hands: EncodedHands) -> None:
-        """Publish the hands of an avatar under both of its topics."""
+    def send_avatar(self, message: HandsMessage) -> None:
+        """Publish the hands of an avatar under those of its topics that have subscribers."""
         if self._retry_s is not None:
             return
         try:
-            for topic, payload in zip(hand_topics(str(hands.message.hand)), (hands.msgpack, hands.binary), strict=True):
-                self._bound.socket.send(topic + payload)
+            for topic, encode in zip(hand_topics(str(message.hand)), (encode_msgpack, encode_binary), strict=True):
+                if self._is_subscribed(topic):
+                    self._bound.socket.send(topic + encode(message))
         except zmq.ZMQError as error:
             self._bound.close()
             self._fail(error)
+
+    def _is_subscribed(self, topic: bytes) -> bool:
+        return any(topic.startswith(prefix) for prefix in self._subscribed)
 
     def _read_subscriptions(self) -> None:
         """Note what clients have subscribed to since the last call, and what none of them subscribes to any longer."""

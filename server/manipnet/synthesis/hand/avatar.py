@@ -294,12 +294,17 @@ class _Builder:
         of_message = {OUR_BONES[k]: b for k, b in self.bone_of.items()}
         angle_of = np.array([of_message.get(bone, -1) for bone in range(17)])
         local = np.array([frames[max(p, 0)].T @ f for p, f in zip(hand.parents, frames, strict=False)])
-        return OpenXrPlaces(bones, points, turns, angle_of, matrix_to_quat(local))
+        own = np.tile([0.0, 0, 0, 1], (len(frames), 1))
+        for k, bone in self.bone_of.items():
+            own[bone] = turns[k]
+        return OpenXrPlaces(bones, points, turns, angle_of, matrix_to_quat(local), own)
 
 
 def openxr_frame(along: Array, back: Array) -> Array:
     """Columns of the OpenXR frame of a bone that points `along`, whose back side faces about `back`."""
     z = -_unit(along)
+    if np.linalg.norm(np.cross(back, z)) < 1e-3 * np.linalg.norm(back) + 1e-9:  # no hint: any direction across the bone
+        back = np.eye(3)[np.argmin(np.abs(z))]
     x = _unit(np.cross(back, z))
     return np.stack([x, np.cross(z, x), z], axis=1)
 

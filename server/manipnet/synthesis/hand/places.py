@@ -28,6 +28,8 @@ class OpenXrPlaces(NamedTuple):
     """`(17,)` the avatar's bone for each of the 17 bones of a message; -1 where it has none."""
     rest: Array
     """`(B, 4)` local rotation of each bone in the profile's rest pose."""
+    own: Array
+    """`(B, 4)` from the frame of each bone to that of its joint in the profile, which need not lie along the bone."""
 
 
 @kernel
@@ -36,14 +38,24 @@ def place_joints(
     places: OpenXrPlaces,
     angles: Array,
     wrist: Array,
+    shift: Array,
     left: bool,
+    moved: Array,
     turns: Array,
     joints: Array,
 ):
-    """Pose a hand with `angles (A,)` at `wrist (7,)`: into `turns (17, 4)`, which lead from the rest pose in the bones'
-    own frames, and `joints (26, 7)` in the world."""
+    """Pose a hand with `angles (A,)` at `wrist (7,)`, moved by `shift (3,)` in the frame of a right hand's wrist.
+
+    It is written into `moved (7,)`, the wrist, `turns (17, 4)`, which lead from the rest pose in the bones' own frames,
+    and `joints (26, 7)` in the world.
+    """
     skeleton, positions, rotations, axes = unpack_skeleton(hand), _positions(), _rotations(), _axes()
     quats, quat, turned, point = _quats(), _quat(), _quat(), vector()
+    for i in range(3):
+        point[i] = -shift[i] if left and i == 0 else shift[i]
+    quat_rotate_into(wrist[3:], point, moved[:3])
+    for i in range(7):
+        moved[i] = moved[i] + wrist[i] if i < 3 else wrist[i]
     forward_kinematics_into(skeleton, angles, positions, rotations, axes)
     for bone in range(len(skeleton.rest)):
         matrix_to_quat_into(rotations[bone], False, quats[bone])
@@ -53,7 +65,9 @@ def place_joints(
             turns[k, 0], turns[k, 1], turns[k, 2], turns[k, 3] = 0.0, 0.0, 0.0, 1.0
             continue
         multiply_quats_into(quats[max(skeleton.parents[bone], 0)], -1.0, quats[bone], quat)
-        multiply_quats_into(places.rest[bone], -1.0, quat, turns[k])
+        multiply_quats_into(places.rest[bone], -1.0, quat, turned)
+        multiply_quats_into(places.own[bone], -1.0, turned, quat)
+        multiply_quats_into(quat, 1.0, places.own[bone], turns[k])
         if left:
             turns[k, 1], turns[k, 2] = -turns[k, 1], -turns[k, 2]
     for k in range(len(joints)):
@@ -67,5 +81,5 @@ def place_joints(
             point[0], turned[1], turned[2] = -point[0], -turned[1], -turned[2]
         quat_rotate_into(wrist[3:], point, joints[k, :3])
         for i in range(3):
-            joints[k, i] += wrist[i]
+            joints[k, i] += moved[i]
         multiply_quats_into(wrist[3:], 1.0, turned, joints[k, 3:])

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manipnet.geometry import SIDES, Array, Side, compose, invert, mirror_poses
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
@@ -162,12 +163,12 @@ def _radii(side: Side, values: Any) -> Array:
         if not _is_number(value):
             raise ProfileError(f"{where} must be a number, or null if it is unknown, not {_kind(value)}")
         if not RADII_M[0] <= value <= RADII_M[1]:
-            raise ProfileError(f"{where} is {value:.4g} m; allowed are {RADII_M[0]:g} to {RADII_M[1]:g} m")
+            raise ProfileError(f"{where} is {_kind(value)} m; allowed are {RADII_M[0]:g} to {RADII_M[1]:g} m")
         radii[k] = value
     return radii
 
 
-def _duplicates(joints: Array) -> Array:
+def _duplicates(joints: Array) -> NDArray[np.bool_]:
     """Which joints of fingers lie where an earlier joint of the same finger does, `(26,)`."""
     same = np.zeros(_COUNT, np.bool_)
     for finger in FINGERS:
@@ -248,4 +249,6 @@ def _kind(value: Any) -> str:
         return f"a list of {len(value)}"
     if isinstance(value, Mapping):
         return f"a map with {', '.join(map(str, list(value)[:5])) or 'nothing'}"
+    if isinstance(value, int) and abs(value) > _HUGE:
+        return "a huge integer"
     return f"{value!r}"[:40]

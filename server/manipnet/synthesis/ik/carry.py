@@ -22,7 +22,7 @@ from manipnet.synthesis.objects.distance_field import Field, field_distance
 from manipnet.synthesis.sensing.scene import map_direction_back, map_point, object_from_wrist
 
 MAX_SAMPLES = 128
-SHARED_ITERATIONS, FINGER_ITERATIONS = 2, 3
+SHARED_ITERATIONS, FINGER_ITERATIONS = 1, 2
 """Steps that move the wrist with the fingers, and steps of the fingers alone about the wrist as it is shown."""
 REACH_M = 0.025
 """A counterpart that is farther from the object than this is free."""
@@ -39,8 +39,8 @@ SLIDE_WEIGHT = 0.15
 """Pull of a touching pad toward the place where the model's pad is."""
 STAY_WEIGHT_M2 = 5e-4
 """Pull toward the model's angles, in square metres per square radian."""
-CALM_WEIGHT_M2 = 1.5e-2
-"""Pull toward the last tick's difference from the model's angles."""
+CALM_WEIGHT_M2 = 1.3e-2
+"""Pull toward the last tick's difference from the model's angles, for a hand of the model's length."""
 WRIST_WEIGHT = 0.35
 """Pull of the wrist toward where it is tracked."""
 WRIST_PACE = 0.15
@@ -185,6 +185,7 @@ def carry_contacts(
     max_shift_m: float,
     model_angles: Array,
     pace: float,
+    calm_weight_m2: float,
     followed: Array,
     before: Array,
     angles: Array,
@@ -195,7 +196,7 @@ def carry_contacts(
     `wrist` and `obj` are poses `(7,)` of the scene, both mirrored for a left hand; `size` is the size of the actor's
     hand relative to the model's. `touching` is how much contact counts, 0 to 1. `followed (A,)`, `before (A,)` and
     `shift` are replaced: the model's angles as the avatar follows them, at its `pace`, the difference that contact
-    makes, and the shift, all of the last tick.
+    makes, which changes against the pull of `calm_weight_m2`, and the shift, all of the last tick.
     """
     skeleton, chains = unpack_skeleton(avatar), unpack_chains(avatar)
     theirs = unpack_skeleton(model)
@@ -255,11 +256,11 @@ def carry_contacts(
                         normal[finger, k, j] = 0.0
                     for j in range(3):
                         mixed[finger, k, j] = 0.0
-                    normal[finger, k, k] = STAY_WEIGHT_M2 + CALM_WEIGHT_M2
+                    normal[finger, k, k] = STAY_WEIGHT_M2 + calm_weight_m2
                     slope[finger, k] = 0.0
                     if angle >= 0:
                         away = angles[angle] - reference[angle]
-                        slope[finger, k] = -STAY_WEIGHT_M2 * away + CALM_WEIGHT_M2 * (before[angle] - away)
+                        slope[finger, k] = -STAY_WEIGHT_M2 * away + calm_weight_m2 * (before[angle] - away)
             elif not shared:
                 continue
             for s in range(samples.first[finger], samples.first[finger + 1]):
