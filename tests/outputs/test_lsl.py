@@ -28,6 +28,13 @@ def inlet(name):
     return made
 
 
+def pulled(made):
+    """The next sample and its time."""
+    sample, at_s = made.pull_sample(PATIENCE_S)
+    assert sample is not None, "nothing has arrived"
+    return list(sample), at_s
+
+
 def labels(made):
     channel = made.info(PATIENCE_S).desc().child("channels").child("channel")
     out = []
@@ -54,7 +61,7 @@ def test_hands_bodies_and_events_are_read_back(sender):
     assert sender.send(EncodedHands(one_handed, b"", b""))
     after_s = pylsl.local_clock()
 
-    sample, at_s = hands.pull_sample(PATIENCE_S)
+    sample, at_s = pulled(hands)
     assert len(sample) == len(labels(hands)) == 2 * 26 * 7
     assert labels(hands)[7 * 26] == f"right_{OPENXR_JOINT_NAMES[0]}_px"
     assert np.isnan(sample[: 26 * 7]).all()
@@ -62,12 +69,12 @@ def test_hands_bodies_and_events_are_read_back(sender):
     latency_s = LIVE.latency_ms.total / 1e3
     assert before_s - latency_s - 1e-3 <= at_s <= after_s - latency_s + 1e-3
 
-    sample, _ = bodies.pull_sample(PATIENCE_S)
+    sample, _ = pulled(bodies)
     assert labels(bodies)[::7] == [f"{body.name}_px" for body in LIVE.bodies]
     assert np.isnan(sample[-7:]).all(), "the mug is not tracked"
     np.testing.assert_allclose(sample[:7], LIVE.bodies[0].pose, atol=1e-6)
 
-    assert events.pull_sample(PATIENCE_S)[0] == ["left absent"]
+    assert pulled(events)[0] == ["left absent"]
 
 
 def test_other_bodies_begin_another_stream(sender):

@@ -73,7 +73,7 @@ def capsule_skin(hand: Hand) -> Skin:
     for (start, end), radius in zip(hand.capsules.tolist(), hand.radii.tolist(), strict=True):
         along = positions[end] - positions[start]
         capsule = trimesh.creation.capsule(float(np.linalg.norm(along)), radius, count=(_SEGMENTS, _SEGMENTS))
-        turn = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], along)[:3, :3]
+        turn = np.asarray(trimesh.geometry.align_vectors([0.0, 0.0, 1.0], along))[:3, :3]
         faces.append(capsule.faces + sum(map(len, vertices)))
         vertices.append(capsule.vertices @ turn.T + positions[start])
         bones.append(np.full(len(capsule.vertices), start))
