@@ -68,16 +68,33 @@ def found_parts(armature: bpy.types.Object, side: str) -> dict[str, str]:
 
 
 def read_bone_map(path: Path) -> dict[str, str]:
-    """Read a bone map, a JSON object `{"LeftHand": "name of a bone", …}`. Raises `RigError` and `OSError`."""
+    """Read a bone map, a JSON object `{"LeftHand": "name of a bone", …}` whose keys are names of any known program.
+
+    Returns it with the names of `ALL_PARTS`. Raises `RigError` and `OSError`.
+    """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except ValueError as error:
         raise RigError(f"{path} is not JSON: {error}") from None
     if not isinstance(content, dict) or not all(isinstance(name, str) for name in content.values()):
         raise RigError(f'{path} must hold one JSON object of the form {{"LeftHand": "name of a bone", …}}')
-    if unknown := [part for part in content if part not in ALL_PARTS]:
-        raise RigError(f"{path} names {', '.join(unknown)}; allowed are {', '.join(ALL_PARTS)}")
-    return content
+    if unknown := [name for name in content if _part_of(name) is None]:
+        raise RigError(
+            f"{path} names {', '.join(unknown)}; allowed are {', '.join(ALL_PARTS)}, and other programs' names"
+        )
+    return {part: bone for name, bone in content.items() if (part := _part_of(name)) is not None}
+
+
+def _part_of(name: str) -> str | None:
+    """The entry of `ALL_PARTS` that a bone with a known name is."""
+    for side in SIDES:
+        if is_hand(name, side):
+            return f"{side.capitalize()}Hand"
+        for finger in range(len(FINGERS)):
+            for part in range(len(PARTS)):
+                if matches(name, side, finger, part, False):
+                    return side.capitalize() + FINGERS[finger] + PARTS[part]
+    return None
 
 
 def write_bone_map(path: Path, bone_map: Mapping[str, str]) -> None:

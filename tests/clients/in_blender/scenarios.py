@@ -175,8 +175,12 @@ def a_bone_map_serves_bones_with_any_name():
     path = Path(FOLDER) / "map.json"
     chosen.set_bone_map(bone_map)
     assert bpy.ops.manipnet.save_bone_map(filepath=str(path), index=0) == {"FINISHED"}
-    chosen.bones.clear()
-    assert bpy.ops.manipnet.load_bone_map(filepath=str(path), index=0) == {"FINISHED"}
+    saved = path.read_text()
+    for content in (saved, saved.replace("LeftIndexProximal", "LeftHandIndex1").replace('LeftHand"', 'hand_l"')):
+        path.write_text(content)
+        chosen.bones.clear()
+        assert bpy.ops.manipnet.load_bone_map(filepath=str(path), index=0) == {"FINISHED"}
+        assert chosen.bone_map() == bone_map
     start(*scene.manipnet.cast())
     left = mixamo("Left")
     assert deviations_deg(rig, shown("left"), lambda f, p: "b" + left(f, p)[::-1]).max() < 0.5

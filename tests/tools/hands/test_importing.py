@@ -126,6 +126,26 @@ def test_the_unit_of_a_bvh_file_is_guessed_and_said(tmp_path, scale, unit):
     assert any(unit in line for line in said)
 
 
+def test_the_bone_map_of_the_clients_adds_to_the_names(tmp_path):
+    nodes = [(name.replace("Index", "Zeige").replace("RightHand", "R.Tatze"), *rest) for name, *rest in rig()]
+    table = {f"Left{part}": f"LeftHandZeige{n}" for n, part in ((1, "HandIndex1"), (2, "IndexIntermediate"))}
+    table |= {"index_03_l": "LeftHandZeige3", "RightHand": "R.Tatze"}
+    for word, name in zip(WORDS, ("Thumb", "Zeige", "Middle", "Ring", "Pinky"), strict=True):
+        table |= {f"RightHand{word}{n}": f"R.Tatze{name}{n}" for n in (1, 2, 3)}
+    (tmp_path / "map.json").write_text(json.dumps(table))
+    rigged = write_glb(tmp_path / "a.glb", nodes)
+    profile = import_profile(rigged, "a", MODEL, lambda _: None, tmp_path / "map.json")
+    plain = import_profile(write_glb(tmp_path / "b.glb", rig(tips=False)), "b", MODEL, lambda _: None)
+    for side in SIDES:
+        bones = [k for row in FINGERS for k in row[:-1]]
+        heads, expected = (each.hands[side].joints[bones, :3] for each in (profile, plain))
+        np.testing.assert_allclose(heads, expected, atol=1e-3)
+    for wrong, said in (({"LeftToe": "R.Tatze"}, "not a name"), ({"LeftHand": "Tatze"}, "no bone 'Tatze'")):
+        (tmp_path / "map.json").write_text(json.dumps(wrong))
+        with pytest.raises(RigFileError, match=said):
+            import_profile(rigged, "a", MODEL, lambda _: None, tmp_path / "map.json")
+
+
 def test_a_map_by_hand_replaces_the_names(tmp_path):
     nodes = [(f"b{n}", parent, place) for n, (_, parent, place) in enumerate(rig(sides=("right",)))]
     joints = ["wrist"]

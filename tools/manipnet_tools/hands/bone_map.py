@@ -2,13 +2,15 @@
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Final
 
 from manipnet.geometry import SIDES, Side
 from manipnet.synthesis.hand.profile import FINGERS
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, WEBXR_JOINT_NAMES
-from manipnet.wire.rig_names import find_bones
+from manipnet.wire.rig_names import PARTS, find_bones, finger_names, hand_names, metacarpal_names, plain
 from manipnet_tools.hands.rig_file import RigFileError, Skeleton
 
 JOINTS: Final = {name: k for k, name in enumerate(OPENXR_JOINT_NAMES)}
@@ -41,13 +43,23 @@ def map_bones(skeleton: Skeleton, where: str) -> dict[Side, BoneMap]:
 
 
 def read_map(path: Path, skeleton: Skeleton) -> dict[Side, BoneMap]:
-    """A map from a JSON file `{"left"|"right": {OpenXR joint: name of a bone}}`. Raises `RigFileError`."""
+    """A map from a JSON file. Raises `RigFileError`.
+
+    It is the bone map of the clients, `{"LeftHandIndex1": name of a bone, …}`, whose keys are names of any program
+    that is known, and which adds to the bones that are found by their own names; or, for rigs with other joints, `{"left"|"right":
+    {OpenXR joint: name of a bone}}`.
+    """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise RigFileError(f"{path}: is not a JSON file ({error})") from None
+    if isinstance(content, Mapping) and content and all(isinstance(bone, str) for bone in content.values()):
+        return _read_names(path, content, skeleton)
     if not isinstance(content, Mapping) or not content or not all(side in SIDES for side in content):
-        raise RigFileError(f'{path}: must be {{"left": {{joint: bone}}, "right": {{joint: bone}}}}')
+        raise RigFileError(
+            f'{path}: must be {{"LeftHand": bone, "LeftHandIndex1": bone, …}} with the names of any known program, or '
+            '{"left": {joint: bone}, "right": {joint: bone}} with those of OpenXR'
+        )
     hands: dict[Side, BoneMap] = {}
     for side in SIDES:
         if side in content:
@@ -55,6 +67,26 @@ def read_map(path: Path, skeleton: Skeleton) -> dict[Side, BoneMap]:
             if JOINTS["wrist"] not in hands[side]:
                 raise RigFileError(f"{path}: {side} has no wrist; give the bone of the hand as wrist")
     return hands
+
+
+def _read_names(path: Path, content: Mapping[str, str], skeleton: Skeleton) -> dict[Side, BoneMap]:
+    """The hands of a rig in which the named bones have the names that the map gives them."""
+    names = list(skeleton.names)
+    for known, bone in content.items():
+        if plain(known) not in _known_names():
+            raise RigFileError(f"{path}: {known!r} is not a name that a known program gives to a bone of a hand")
+        names[_bone(path, bone, skeleton)] = known
+    return map_bones(replace(skeleton, names=names), str(path))
+
+
+@cache
+def _known_names() -> frozenset[str]:
+    fingers, parts = range(len(FINGERS)), range(len(PARTS))
+    names = [hand_names(side) for side in SIDES] + [
+        metacarpal_names(side, finger) for side in SIDES for finger in fingers
+    ]
+    names += [finger_names(side, finger, part) for side in SIDES for finger in fingers for part in parts]
+    return frozenset(name for each in names for name in each)
 
 
 def _joint(path: Path, name: str) -> int:
