@@ -45,8 +45,8 @@ def map_bones(skeleton: Skeleton, where: str) -> dict[Side, BoneMap]:
 def read_map(path: Path, skeleton: Skeleton) -> dict[Side, BoneMap]:
     """A map from a JSON file. Raises `RigFileError`.
 
-    It is the bone map of the clients, `{"LeftHandIndex1": name of a bone, …}`, whose keys are names of any program that is
-    known, and which adds to the bones that are found by their own names; or, for rigs with other joints,
+    It is the bone map of the clients, `{"LeftHandIndex1": name of a bone, …}`. Its keys are names of any program that
+    is known, and it adds to the bones that are found by their own names. For rigs with other joints, it is
     `{"left"|"right": {OpenXR joint: name of a bone}}`.
     """
     try:
