@@ -148,7 +148,7 @@ def _serve(config: ServerConfig, json_log: bool) -> int:
     console = Console(as_json=json_log)
     logging.basicConfig(level=logging.WARNING, handlers=[console], force=True)
     if not precompiler.idle:
-        logging.getLogger(__name__).warning("the first start takes about 15 s longer, since code is compiled once")
+        logging.getLogger(__name__).warning("the first start takes about 20 s longer, since code is compiled once")
     try:
         with stop_on_signals() as stop:
             server = Server(config, console.say, precompiler.wait)
