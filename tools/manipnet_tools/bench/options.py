@@ -11,7 +11,9 @@ from manipnet.synthesis.model.providers import DEFAULT_MODEL, Provider
 from manipnet.synthesis.model.shipped import find_bundle
 from manipnet_tools.commands.checks import require_folder_of, require_meshes, require_take
 
-Section = Literal["tick", "models", "triangles", "actors", "intake", "straightforward", "start", "live", "minutes"]
+Section = Literal[
+    "tick", "models", "triangles", "actors", "intake", "straightforward", "start", "live", "cost", "minutes"
+]
 SECTIONS: Final[tuple[Section, ...]] = get_args(Section)
 USUAL: Final[tuple[Section, ...]] = tuple(name for name in SECTIONS if name != "minutes")
 """The sections that are measured by default."""
