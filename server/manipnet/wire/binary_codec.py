@@ -121,10 +121,9 @@ _CODES: Mapping[str, str] = {"u1": "B", "u2": "H", "u4": "I", "u8": "Q", "f4": "
 
 def _packer(dtype: np.dtype, names: Sequence[str] = ()) -> struct.Struct:
     """Packs the fields of a record, or those named, from their first to the end of the record."""
-    places = {name: (dtype.fields or {})[name][:2] for name in names or dtype.names or ()}
-    at = min(offset for _, offset in places.values())
-    text = "<"
-    for kind, offset in places.values():
+    places = [place[:2] for name, place in (dtype.fields or {}).items() if not names or name in names]
+    text, at = "<", places[0][1]
+    for kind, offset in places:
         text += "x" * (offset - at) + _code(kind)
         at = offset + kind.itemsize
     return struct.Struct(text + "x" * (dtype.itemsize - at))
