@@ -9,6 +9,7 @@ from manipnet import inputs, outputs
 from manipnet.common.options import (
     Choice,
     ConfigError,
+    Endpoint,
     Folder,
     Network,
     Networks,
@@ -21,6 +22,7 @@ from manipnet.common.options import (
     from_keys,
     option,
     options_of,
+    parse_endpoint,
 )
 from manipnet.net.addresses import is_loopback
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER, SOLVERS
@@ -39,6 +41,8 @@ MAX_ACTORS: Final = 16
 MAX_OBJECTS: Final = 32
 SCALE_RANGE: Final = (0.2, 5.0)
 """Allowed scale factors of a hand."""
+
+CONTROL_PORT: Final = 5557
 
 TRACKED: Final = "what is tracked"
 SYNTHESIS: Final = "how the fingers are synthesised"
@@ -121,7 +125,7 @@ class ServerConfig:
         group=SYNTHESIS,
     )
     host: str = option("127.0.0.1", Text("ADDRESS"), "address of this machine to listen on", group=SERVER)
-    control_port: int = option(5557, Port(), "TCP port for control requests (ZeroMQ REP)", group=SERVER)
+    control_port: int = option(CONTROL_PORT, Port(), "TCP port for control requests (ZeroMQ REP)", group=SERVER)
     page_port: int = option(8080, Port(), "TCP port of the live page (HTTP and WebSocket)", group=SERVER)
     metrics_port: int | None = option(
         None, Port(), "TCP port of metrics for Prometheus (HTTP); by default no metrics are served", group=SERVER
@@ -191,6 +195,11 @@ def server_config(actors: tuple[ActorConfig, ...], values: Mapping[str, Any], ri
 def default_actor(objects: tuple[ObjectConfig, ...] = ()) -> ActorConfig:
     """The actor of a server without a rig file: its wrists are the bodies named like `WRISTS`."""
     return ActorConfig("actor", {wrist: BodyConfig(wrist) for wrist in WRISTS}, objects)
+
+
+def control_endpoint(text: str) -> Endpoint:
+    """The control port of a server from `HOST`, `HOST:PORT` or `tcp://HOST:PORT`. Raises `ConfigError`."""
+    return parse_endpoint(text.removeprefix("tcp://"), CONTROL_PORT)
 
 
 def parse_object(text: str) -> ObjectConfig:

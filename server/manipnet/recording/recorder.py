@@ -32,10 +32,12 @@ class Recorder:
         self._folder, self._about, self._telemetry = folder, about, telemetry
         self._open: OpenRecording | None = None
         self._lock = threading.Lock()
+        self.finished: list[str] = []
+        """The file names of the recordings that were finished in this session."""
 
     def note(self, payload: bytes) -> None:
         """Record a hands message, given as msgpack, if a recording is in progress; returns at once."""
-        recording = self._current()
+        recording = self.current()
         if recording is not None:
             recording.note(payload)
 
@@ -48,7 +50,13 @@ class Recorder:
         with suppress(RequestError):
             self._stop_recording({})
 
-    def _current(self) -> OpenRecording | None:
+    @property
+    def folder(self) -> Path:
+        """The folder of the recordings."""
+        return self._folder.resolve()
+
+    def current(self) -> OpenRecording | None:
+        """The recording in progress. From any thread."""
         recording = self._open
         return None if recording is None or recording.is_broken else recording
 
@@ -68,7 +76,7 @@ class Recorder:
                 "use ASCII letters, or start the server with PYTHONUTF8=1"
             )
         with self._lock:
-            if (recording := self._current()) is not None:
+            if (recording := self.current()) is not None:
                 raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
             self._check_space()
             if path.exists():
@@ -106,10 +114,11 @@ class Recorder:
                 counts = recording.finish()
             except RecordingFailedError as error:
                 raise RequestError(str(error)) from None
+            self.finished.append(recording.path.name)
         return {"name": recording.path.name, "seconds": recording.seconds, **counts}
 
     def _recordings(self, _: Request) -> dict[str, Any]:
-        recording = self._current()
+        recording = self.current()
         files = sorted(self._folder.glob("*.mcap"), key=_changed_s, reverse=True)
         return {
             "folder": str(self._folder.resolve()),

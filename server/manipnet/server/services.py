@@ -28,6 +28,7 @@ class Services:
 
     loop: TickLoop
     addresses: dict[str, str]
+    recorder: Recorder
 
 
 def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) -> Services:
@@ -68,4 +69,5 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
         metrics = MetricsPage(LOOPBACK, config.metrics_port, telemetry)
         opened.callback(metrics.close)
         addresses["metrics"] = metrics.address
-    return Services(session.tick_loop(publisher.publish, page), addresses)
+    session.addresses = addresses
+    return Services(session.tick_loop(publisher.publish, page), addresses, recorder)
