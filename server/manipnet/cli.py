@@ -167,13 +167,15 @@ def _serve(config: ServerConfig, json_log: bool, opens_page: bool) -> int:
 
 def _serve_with(console: "Console", config: ServerConfig, opens_page: bool) -> int:
     share_arenas()
-    with StartProgress(console.show, _log.info) as progress:
+    with StartProgress(console.show, _log.info, console.is_terminal) as progress:
         from manipnet.runtime.precompile import Precompiler
 
         precompiler = Precompiler()
         precompiler.start()
         if precompiler.idle:
             progress.end()
+        else:
+            progress.begin()  # what is kept is that of another version
         from manipnet.net.curve_keys import KeyFileError
         from manipnet.net.errors import ListenError
         from manipnet.runtime.signals import stop_on_signals
@@ -183,6 +185,8 @@ def _serve_with(console: "Console", config: ServerConfig, opens_page: bool) -> i
 
         def say(line: str) -> None:
             progress.end()
+            if line.startswith("ready "):
+                console.show("")
             console.say(line)
             if opens_page and line.startswith("ready "):
                 open_page(line)

@@ -15,6 +15,7 @@ import textwrap
 import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -161,7 +162,7 @@ def _help_texts(kind: type) -> dict[str, str]:
     for each in reversed(kind.__mro__[:-1]):
         (found,) = ast.parse(textwrap.dedent(inspect.getsource(each))).body
         body = found.body if isinstance(found, ast.ClassDef) else []
-        for before, after in zip(body, body[1:], strict=False):
+        for before, after in pairwise(body):
             if isinstance(before, ast.AnnAssign) and isinstance(before.target, ast.Name) and _is_text(after):
                 texts[before.target.id] = " ".join(ast.literal_eval(after.value).split())  # type: ignore[attr-defined]
     return texts

@@ -13,9 +13,9 @@ import time
 from collections.abc import Callable
 from typing import Any, Final, TextIO
 
+from manipnet.common.log_limits import RepeatFilter
 from manipnet.common.text_output import silence
 from manipnet.runtime.terminal import Terminal, ready_table
-from manipnet.telemetry import RepeatFilter
 
 WAITING_LINES: Final = 200
 _CONTROLS: Final = re.compile("[\0-\b\v-\x1f\x7f-\x9f]")

@@ -9,29 +9,33 @@ from typing import Final
 
 from platformdirs import user_cache_dir
 
-USUAL_S: Final = 15
-"""How long compiling takes on a small machine, as the text says."""
 STEP_S: Final = 1.0
 LOG_S: Final = 5.0
-TEXT: Final = f"first start: compiling, once, for about {USUAL_S} s"
+TEXT: Final = "first start: code is compiled once, which takes some seconds"
 
 
 class StartProgress:
     """Reports once a second with `show`, and every few seconds with `log`, that a start compiles; until `end`."""
 
-    def __init__(self, show: Callable[[str], None], log: Callable[[str], None]) -> None:
-        self._show, self._log = show, log
+    def __init__(self, show: Callable[[str], None], log: Callable[[str], None], is_terminal: bool) -> None:
+        """A terminal shows the progress in place, so `log` gets only one line there."""
+        self._show, self._log, self._is_terminal = show, log, is_terminal
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="start-progress", daemon=True)
 
     def __enter__(self) -> "StartProgress":
         if is_first_start():
-            self._log(TEXT)
-            self._thread.start()
+            self.begin()
         return self
 
     def __exit__(self, *_: object) -> None:
         self.end()
+
+    def begin(self) -> None:
+        """Begin to report, unless it has begun."""
+        if self._thread.ident is None:
+            self._log(TEXT)
+            self._thread.start()
 
     def end(self) -> None:
         """Report nothing any more."""
@@ -42,7 +46,7 @@ class StartProgress:
         while not self._ended.wait(STEP_S):
             passed_s = time.monotonic() - begin_s
             self._show(f"{TEXT}: {passed_s:.0f} s so far")
-            if passed_s - logged_s >= LOG_S:
+            if not self._is_terminal and passed_s - logged_s >= LOG_S:
                 logged_s = passed_s
                 self._log(f"still compiling after {passed_s:.0f} s")
 

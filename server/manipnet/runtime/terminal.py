@@ -30,23 +30,19 @@ class Terminal:
 
     def line(self, text: str) -> None:
         """Write a line above the status line."""
-        self._erase()
-        self._stream.write(f"{text}\n")
-        self._draw()
+        self._write(f"{text}\n{self._status}")
 
     def status(self, text: str) -> None:
         """Replace the status line; an empty text leaves none."""
-        self._erase()
         room = min(shutil.get_terminal_size((WIDTH, 24)).columns, WIDTH) - 1  # a full line would wrap
-        self._status = _cut(text, room)
-        self._draw()
+        text = _cut(text, room)
+        self._write(text)
+        self._status = text
 
-    def _erase(self) -> None:
-        if self._status:
-            self._stream.write(f"\r{' ' * _columns(self._status)}\r")
-
-    def _draw(self) -> None:
-        self._stream.write(self._status)
+    def _write(self, text: str) -> None:
+        """Write a text in place of the status line."""
+        erased = f"\r{' ' * _columns(self._status)}\r" if self._status else ""
+        self._stream.write(erased + text)
         self._stream.flush()
 
 

@@ -146,7 +146,7 @@ class SynthesizeOptions(WritingOptions):
     out: Annotated[Path, arg(metavar="FILE")]
     """The file to write, .npz."""
     mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
-    """An object and its mesh in metres, a file or an object of the library; by default the meshes in the recording, or else those of the rig."""
+    """An object and its mesh, a file in metres or a name of the library; by default the recording's or the rig's."""
     model: Annotated[str, arg(metavar="NAME")] = DEFAULT_MODEL
     """The model: the name of a shipped bundle, or a bundle's folder."""
     look_ahead: Annotated[float, arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
@@ -184,7 +184,7 @@ class BatchOptions:
     out: Annotated[Path, arg(metavar="DIR")]
     """The folder for the results: one .npz per take, and summary.json."""
     mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
-    """An object and its mesh in metres, a file or an object of the library; by default the meshes in each recording, or else those of the rig."""
+    """An object and its mesh, a file in metres or a name of the library; by default the recording's or the rig's."""
     model: Annotated[str, arg(metavar="NAME")] = DEFAULT_MODEL
     """The model: the name of a shipped bundle, or a bundle's folder."""
     look_ahead: Annotated[float, arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S

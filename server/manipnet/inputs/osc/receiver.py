@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from manipnet.common.log_limits import LogThrottle
 from manipnet.common.options import Network
 from manipnet.inputs.base import Intake
 from manipnet.inputs.declaration import Receiver
@@ -17,7 +18,6 @@ from manipnet.net.flood_filter import FloodFilter, FloodWatch
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import Address, UdpThread, bind_udp
-from manipnet.telemetry import LogThrottle
 from manipnet.wire.bodies import BodyFrame, MessageError
 
 MAX_SENDERS = 16
