@@ -54,6 +54,8 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "messages_out": ("topic", ()),
     "control_requests": ("op", CONTROL_OPS),
     "recorded": ("fate", ("written", "lost")),
+    "record_triggers": ("fate", ("started", "stopped", "repeated", "ignored", "failed")),
+    "triggers_refused": ("reason", ("malformed", "oversized", "doctype", "not_allowed", "rate", "busy")),
     "page_frames": ("fate", ("shown", "skipped")),
     "page_ended": ("reason", ("crash",)),
 }

@@ -9,7 +9,7 @@ from typing import Any
 from manipnet import __version__
 from manipnet.common.text_output import accept_any_text
 from manipnet.synthesis.model.shipped import version_text
-from manipnet_tools.arguments import parsed, parser_for
+from manipnet_tools.commands.arguments import parsed, parser_for
 
 
 @dataclass(frozen=True)

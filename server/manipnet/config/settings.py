@@ -43,6 +43,8 @@ SCALE_RANGE: Final = (0.2, 5.0)
 """Allowed scale factors of a hand."""
 
 CONTROL_PORT: Final = 5557
+TRIGGER_PORT: Final = 1512
+"""Where Motive sends its remote trigger: its command port plus 2."""
 
 TRACKED: Final = "what is tracked"
 SYNTHESIS: Final = "how the fingers are synthesised"
@@ -129,6 +131,15 @@ class ServerConfig:
     page_port: int = option(8080, Port(), "TCP port of the live page (HTTP and WebSocket)", group=SERVER)
     metrics_port: int | None = option(
         None, Port(), "TCP port of metrics for Prometheus (HTTP); by default no metrics are served", group=SERVER
+    )
+    trigger_port: int = option(
+        TRIGGER_PORT, Port(), "UDP port on which Motive's remote trigger begins and ends recordings", group=SERVER
+    )
+    trigger_host: str = option(
+        "127.0.0.1",
+        Text("ADDRESS"),
+        "address of this machine for that port; 0.0.0.0 for the broadcast of a Motive on another machine",
+        group=SERVER,
     )
     keys: Path | None = option(
         None, Folder(), "let only clients with keys connect over ZeroMQ; `manipnet keys` makes the keys", group=SERVER
@@ -228,6 +239,12 @@ def check(config: ServerConfig) -> None:
             f"--host {config.host} can be reached from other machines, and nothing keeps strangers out. Give "
             "--keys FOLDER for ZeroMQ (see `manipnet keys`) and --allow NETWORK for OSC; or stay on 127.0.0.1 and use "
             "a tunnel (ssh -L); or add --insecure on a network that you trust"
+        )
+    if not (is_loopback(config.trigger_host) or config.allow or config.insecure):
+        raise ConfigError(
+            f"--trigger-host {config.trigger_host} can be reached from other machines, any of which could begin and "
+            "end recordings. Give --allow NETWORK with the network of Motive's machine, or --insecure on a network "
+            "that you trust"
         )
     _check_actors(config.actors)
 

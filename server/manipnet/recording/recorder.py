@@ -1,11 +1,9 @@
 """The requests `record`, `stop_recording` and `recordings`: one recording at a time, in the folder of the takes."""
 
 import json
-import re
 import shutil
 import sys
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -15,9 +13,9 @@ from manipnet.actors.props import Prop
 from manipnet.common.file_names import is_device, is_encodable
 from manipnet.control.request import Handler, Request, RequestError
 from manipnet.recording.open_recording import OpenRecording, RecordingFailedError
+from manipnet.recording.take_names import NAME, free_path, safe_name, time_name
 from manipnet.telemetry import Telemetry
 
-NAME: Final = re.compile(r"\w([\w .-]{0,62}[\w-])?")
 MIN_FREE_BYTES: Final = 64 << 20
 """Space for a recording to begin: about a minute of one actor."""
 
@@ -60,8 +58,23 @@ class Recorder:
         recording = self._open
         return None if recording is None or recording.is_broken else recording
 
+    def begin(self, name: str, about: Mapping[str, str]) -> Path:
+        """Begin a recording under a name that resembles the given one, and return its file.
+
+        `about` is added to its metadata. Raises `RequestError`.
+        """
+        with self._lock:
+            self._check_space()
+            path = free_path(self._folder, safe_name(name, self._folder))
+            self._open = self._begin(path, about)
+        return path
+
+    def finish(self) -> dict[str, Any]:
+        """End the recording in progress. Raises `RequestError`."""
+        return self._stop_recording({})
+
     def _record(self, request: Request) -> dict[str, Any]:
-        name = request.get("name", time.strftime("take %Y-%m-%d %H.%M.%S"))
+        name = request.get("name", time_name())
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise RequestError(
                 f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
@@ -94,7 +107,7 @@ class Recorder:
                 f"{MIN_FREE_BYTES >> 20} MB to begin; make room, or start the server with --takes on another disk"
             )
 
-    def _begin(self, path: Path) -> OpenRecording:
+    def _begin(self, path: Path, more: Mapping[str, str] | None = None) -> OpenRecording:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -103,6 +116,7 @@ class Recorder:
             ) from None
         metadata, props = self._about()
         meshes = {prop.name: (prop.shape.mesh.vertices, prop.shape.mesh.faces, prop.scale) for prop in props}
+        metadata = {**metadata, **(more or {})}
         return OpenRecording(path, metadata, meshes, self._telemetry)
 
     def _stop_recording(self, _: Request) -> dict[str, Any]:

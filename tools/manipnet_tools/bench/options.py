@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal, get_args
 from manipnet.common.options import ConfigError
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, Provider
 from manipnet.synthesis.model.shipped import find_bundle
-from manipnet_tools.arguments import UseAppendAction, arg
+from manipnet_tools.commands.arguments import UseAppendAction, arg
 from manipnet_tools.commands.checks import require_meshes, require_new, require_take
 from manipnet_tools.commands.options import WritingOptions
 

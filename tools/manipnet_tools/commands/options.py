@@ -13,7 +13,7 @@ from manipnet.config.files import require_file
 from manipnet.config.settings import CONTROL_PORT, control_endpoint
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.model.shipped import find_bundle
-from manipnet_tools.arguments import Positional, UseAppendAction, arg
+from manipnet_tools.commands.arguments import Positional, UseAppendAction, arg
 from manipnet_tools.commands.checks import (
     already_exists,
     require_look_ahead,

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from manipnet.synthesis.model.shipped import find_bundle
-from manipnet_tools.arguments import Positional
+from manipnet_tools.commands.arguments import Positional
 from manipnet_tools.commands.checks import require_new_bundle
 from manipnet_tools.commands.options import WritingOptions
 from manipnet_tools.takes.dataset import DataError, take_folders
