@@ -8,15 +8,19 @@ With `NUMBA_DISABLE_JIT=1` in the environment nothing is compiled and every kern
 can step through, many times slower.
 """
 
+import gc
 import hashlib
 import logging
 import math
 import os
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+
+os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")  # colours every candidate that it rejects
 
 import numba
 import numpy as np
@@ -28,15 +32,21 @@ from numba.np.numpy_support import as_dtype
 from platformdirs import user_cache_dir
 
 from manipnet.common import kernel_cache
+from manipnet.common.kernel_compiler import KernelCompiler, inner_function
 
-kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)  # pyright: ignore
+_OPTIONS: Final[dict[str, Any]] = {"nogil": True, "error_model": "numpy", "_nrt": False}
+kernel = njit(cache=True, pipeline_class=KernelCompiler, **_OPTIONS)
 """A compiled function that Python calls: cached on disk, without the interpreter's lock, with x / 0 as NumPy has it.
 
 Kernels neither allocate nor count references, which for the arrays of a shape took longer than a distance query.
 """
-inner = njit(nogil=True, error_model="numpy", _nrt=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore
-"""A compiled function that only kernels call: it is part of theirs in the cache, and has no Python wrapper, which would
-add a tenth to the time of compiling."""
+
+
+def inner(function: Callable[..., Any]) -> Any:
+    """Mark a function that only kernels call: it becomes part of theirs, without a Python wrapper of its own."""
+    if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]: set at run time
+        return function
+    return inner_function(function, **_OPTIONS)
 
 
 def stack_array(*shape: int, dtype: Any = types.float64) -> Callable[..., Any]:
@@ -77,6 +87,18 @@ COMPILED = ("geometry.py", "synthesis", "tracking")
 """Where compiled functions are, and the constants that are compiled into them; nothing else is part of the state."""
 
 _KEEP_S = 7 * 86400.0
+
+
+@contextmanager
+def collection_paused() -> Iterator[None]:
+    """Pause Python's garbage collection, which would take an eighth of the time of compiling."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
 
 
 def cached(name: str) -> bool:

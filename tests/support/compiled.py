@@ -2,8 +2,10 @@
 
 from numba import njit
 
+from manipnet.common.kernel_compiler import KernelCompiler
 
-@njit
+
+@njit(pipeline_class=KernelCompiler)
 def call(function, *arguments):
     """The result of a compiled `function`."""
     return function(*arguments)

@@ -8,7 +8,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Final
 
-from manipnet.jit import cached, seal_cache
+from manipnet.jit import cached, collection_paused, seal_cache
 from manipnet.runtime.child_process import ChildProcess
 
 SENSING: Final = "_all_but_readings"
@@ -71,6 +71,6 @@ class Precompiler:
 
 
 def _compile(_: Connection) -> None:
-    with suppress(Exception):  # the server meets the same error and reports it
+    with suppress(Exception), collection_paused():  # the server meets the same error and reports it
         compile_aside()
         seal_cache()

@@ -19,6 +19,7 @@ from manipnet.control.peers import Peers
 from manipnet.control.request import Handler, Request
 from manipnet.control.session_requests import SessionRequests
 from manipnet.inputs.sender_stats import SenderStats
+from manipnet.jit import collection_paused
 from manipnet.recording.recorder import carried_objects
 from manipnet.runtime.avatars import avatars_of
 from manipnet.runtime.flight_recorder import FlightRecorder
@@ -50,7 +51,8 @@ class Session:
         self.telemetry = Telemetry()
         self.catalog = ObjectCatalog(config.objects, config.objects_unit)
         self.bundle = load_bundle(config.model, config.provider)
-        pose_a_hand(self.bundle, config.solver)
+        with collection_paused():
+            pose_a_hand(self.bundle, config.solver)
         wait_for_kernels()
         self.actors = [self._load_actor(actor) for actor in config.actors]
         profiles = {actor.name: read_profile(actor.hand) for actor in config.actors if actor.hand is not None}

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import takewhile
@@ -50,9 +50,15 @@ class Served:
 
 
 @contextmanager
-def serving(model: str, meshes: Mapping[str, Path], look_ahead_s: float, cache: Path | None = None) -> Iterator[Served]:
+def serving(
+    model: str,
+    meshes: Mapping[str, Path],
+    look_ahead_s: float,
+    cache: Path | None = None,
+    options: Sequence[str] = (),
+) -> Iterator[Served]:
     """Run `manipnet-serve` on free ports, with its own `cache` folder if one is given. Raises `ServeError`."""
-    options = [f"--{port}=0" for port in _PORTS]
+    options = [*(f"--{port}=0" for port in _PORTS), *options]
     options += [word for name, path in meshes.items() for word in ("--mesh", f"{name}={path}")]
     command = [sys.executable, "-m", "manipnet.cli", *options, "--model", model, "--look-ahead", str(look_ahead_s)]
     environment = os.environ | ({"MANIPNET_CACHE": str(cache)} if cache else {})

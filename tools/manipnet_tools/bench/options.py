@@ -11,7 +11,9 @@ from manipnet_tools.commands.arguments import UseAppendAction, arg
 from manipnet_tools.commands.checks import require_meshes, require_new, require_take
 from manipnet_tools.commands.options import WritingOptions
 
-Section = Literal["tick", "models", "triangles", "actors", "intake", "straightforward", "start", "live", "minutes"]
+Section = Literal[
+    "tick", "models", "triangles", "actors", "intake", "straightforward", "start", "live", "cost", "minutes"
+]
 SECTIONS: Final[tuple[Section, ...]] = get_args(Section)
 USUAL: Final[tuple[Section, ...]] = tuple(name for name in SECTIONS if name != "minutes")
 """The sections that are measured by default."""

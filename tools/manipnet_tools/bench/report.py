@@ -43,6 +43,9 @@ GOALS = (
     Goal("ten minutes, published interval: p99", ("minutes", "interval", "p99_ms"), 18.5, "ms"),
     Goal("ten minutes, hands missing", ("minutes", "missing"), 0.0, ""),
     Goal("resident memory, one actor", ("live", "0.5", "resident_mb"), 350.0, "MB"),
+    Goal("processor, one actor at 120 Hz", ("cost", "one actor, 120 Hz", "processor"), 0.06, "cores"),
+    Goal("processor, 8 actors", ("cost", "8 actors", "processor"), 0.25, "cores"),
+    Goal("own memory, one actor", ("cost", "one actor, 120 Hz", "own_mb"), 120.0, "MB"),
 )
 
 
@@ -89,6 +92,7 @@ def lines(figures: Figures, machine: Machine, about: str) -> Iterator[str]:
     yield from _intake(figures.get("intake", {}))
     yield from _straightforward(figures.get("straightforward", {}))
     yield from _process(figures)
+    yield from _cost(figures.get("cost", {}))
     yield ""
     for goal, value, met in verdicts(figures):
         sign = ">=" if goal.at_least else "<="
@@ -141,6 +145,23 @@ def _straightforward(section: Figures) -> Iterator[str]:
     elif section:
         theirs, ours = section["theirs"]["p50_ms"], section["ours"]["p50_ms"]
         yield f"\nstraightforward version: {theirs:.0f} ms a tick, ours {ours:.3f} ms: {section['times']:.0f} times"
+
+
+def _cost(section: Figures) -> Iterator[str]:
+    if "skipped" in section:
+        yield f"\ncost of a running server: {section['skipped']}"
+    elif section:
+        yield (
+            f"\n{'a running server':20} {'core %':>7} {'/ ref':>7} {'wake-ups/s':>11} {'own MB':>7} {'resident':>9}"
+            f"   (reference at 60 Hz: {100 * section['reference']:.1f} % of a core)"
+        )
+        for name, row in section.items():
+            if isinstance(row, dict):
+                size = "" if row["resident_mb"] is None else f"{row['resident_mb']:9.0f}"
+                yield (
+                    f"{name:20} {100 * row['processor']:7.1f} {row['ratio']:7.2f} {row['wake_ups']:11.0f} "
+                    f"{row['own_mb']:7.0f} {size}"
+                )
 
 
 def _process(figures: Figures) -> Iterator[str]:

@@ -9,7 +9,7 @@ from manipnet.demo.player import DEMO_FILE, DEMO_OBJECTS
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 from manipnet.synthesis.objects.shape import Shape, load_shape
 from manipnet.wire.bodies import BodyFrame
-from manipnet_tools.commands.replay import take_frames
+from manipnet_tools.commands.replay import resample, take_frames
 from manipnet_tools.takes.take import TakeError, read_take
 
 APART = 0.37
@@ -37,14 +37,16 @@ class Scenario:
         return f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
 
 
-def demo() -> Scenario:
-    """The recording that `manipnet-serve --demo` plays."""
-    return take(DEMO_FILE, {name: LIBRARY_FOLDER / f"{name}.ply" for name in DEMO_OBJECTS})
+def demo(rate_hz: float | None = None) -> Scenario:
+    """The recording that `manipnet-serve --demo` plays, at its own rate or at another one."""
+    return take(DEMO_FILE, {name: LIBRARY_FOLDER / f"{name}.ply" for name in DEMO_OBJECTS}, rate_hz)
 
 
-def take(path: Path, meshes: Mapping[str, Path]) -> Scenario:
+def take(path: Path, meshes: Mapping[str, Path], rate_hz: float | None = None) -> Scenario:
     """A take with a mesh for each of its objects. Raises `TakeError` and `MeshError`."""
     recorded = read_take(path)
+    if rate_hz is not None and rate_hz != recorded.rate_hz:
+        recorded = resample(recorded, rate_hz)
     if missing := set(recorded.objects) - meshes.keys():
         raise TakeError(f"{path}: no mesh for {', '.join(sorted(missing))}; give --mesh NAME=FILE for each")
     shapes = {name: load_shape(meshes[name]) for name in recorded.objects}
@@ -59,7 +61,7 @@ def actor_names(actors: int) -> list[str]:
 
 def actor_config(scenario: Scenario, name: str, actors: int) -> ActorConfig:
     """The configuration of one of several actors, for bodies with the names that `endless` gives them."""
-    prefix = _prefix(name, actors)
+    prefix = body_prefix(name, actors)
     return ActorConfig(
         name,
         {wrist: BodyConfig(prefix + wrist) for wrist in WRISTS},
@@ -75,7 +77,7 @@ def endless(scenario: Scenario, actors: int = 1) -> Iterator[BodyFrame]:
     k = 0
     while True:
         bodies = tuple(
-            body._replace(name=_prefix(name, actors) + (body.name or ""))
+            body._replace(name=body_prefix(name, actors) + (body.name or ""))
             for name, shift in zip(names, ahead, strict=True)
             for body in frames[_bounced(k + shift, len(frames))].bodies
         )
@@ -84,7 +86,8 @@ def endless(scenario: Scenario, actors: int = 1) -> Iterator[BodyFrame]:
         k += 1
 
 
-def _prefix(name: str, actors: int) -> str:
+def body_prefix(name: str, actors: int) -> str:
+    """What the names of an actor's bodies start with, where there are several actors."""
     return f"{name}/" if actors > 1 else ""
 
 

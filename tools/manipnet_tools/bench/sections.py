@@ -15,19 +15,22 @@ from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.features import features
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import windows_of
+from manipnet_tools.bench.cost import CASES, cost_of
 from manipnet_tools.bench.harness import STAGES, Race, TickRunner, memory, race
 from manipnet_tools.bench.intake import time_cases
 from manipnet_tools.bench.live import end_to_end, serving, starts
 from manipnet_tools.bench.models import FullWidth, apart_m, quantised, shipped_full_width
 from manipnet_tools.bench.options import Section
+from manipnet_tools.bench.process_cost import supported
 from manipnet_tools.bench.reference import WIDTH
-from manipnet_tools.bench.scenarios import Scenario
+from manipnet_tools.bench.scenarios import Scenario, demo
 from manipnet_tools.bench.shapes import gourd
 
 TRIANGLES = (12, 100, 1000, 5000, 20_000, 80_000, 200_000)
 ACTORS = (1, 2, 4, 8, 16)
 LOOK_AHEADS_S = (0.5, 0.1)
 TEN_MINUTES_S = 600.0
+TICKS_PER_S = 60.0
 STRAIGHTFORWARD = Path(__file__).parents[3] / "benchmarks" / "straightforward.py"
 """Only a checkout has this file; an installed package does not."""
 
@@ -179,6 +182,26 @@ def minutes(bench: Bench) -> Figures:
     return _served(bench, LOOK_AHEADS_S[0], TEN_MINUTES_S)
 
 
+def cost(bench: Bench) -> Figures:
+    """What a whole server uses per second of stream, beside the reference at 60 Hz."""
+    if not supported():
+        return {"skipped": "this system does not report what a process uses in /proc"}
+    reference = min(_processor_s(bench.reference) for _ in range(5)) * TICKS_PER_S
+    figures: Figures = {"reference": reference}
+    for case in CASES:
+        scenario = demo(case.rate_hz or None)
+        row = asdict(cost_of(case, _model(bench), scenario, 0.1 * bench.seconds))
+        figures[case.name] = row | {"ratio": row["processor"] / reference}
+    return figures
+
+
+def _processor_s(function: Callable[[], object], times: int = 60) -> float:
+    start_s = time.process_time()
+    for _ in range(times):
+        function()
+    return (time.process_time() - start_s) / times
+
+
 def _served(bench: Bench, look_ahead_s: float, seconds: float) -> Figures:
     result = end_to_end(_model(bench), bench.scenario, look_ahead_s, seconds)
     return {
@@ -205,5 +228,6 @@ MEASURED: Final[Mapping[Section, Callable[[Bench], Figures]]] = {
     "start": start,
     "live": live,
     "minutes": minutes,
+    "cost": cost,
 }
 """What measures each section."""
