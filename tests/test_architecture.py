@@ -31,7 +31,7 @@ HEIGHT = {name: height for height, layer in enumerate(LAYERS) for name in layer}
 
 MAX_ROOT_MODULES = {SERVER: 6, TOOLS: 4}
 """Modules that may lie beside the packages, `__init__` included; all others belong in a package."""
-HEAVY = {"tyro", "viser", "rich", "torch", "mcap", "matplotlib", "onnx", "ray"}
+HEAVY = {"viser", "rich", "torch", "mcap", "matplotlib", "onnx", "ray"}
 """Libraries that the tick path must not load."""
 MAY_BE_HEAVY = {"page", "recording", "demo"}
 VERSION = "manipnet.__version__"

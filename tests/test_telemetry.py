@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from manipnet.common.log_limits import RepeatFilter
 from manipnet.inputs import INPUTS
 from manipnet.runtime.console import Console
 from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.runtime.status import SilenceWatch
-from manipnet.telemetry import DROP_REASONS, LABELS, RepeatFilter, Telemetry, Timings
+from manipnet.telemetry import DROP_REASONS, LABELS, Telemetry, Timings
 from manipnet.tracking.tick import BodyHealth
 from manipnet.wire.bodies import BodyFrame
 

@@ -6,11 +6,15 @@
 import argparse
 import logging
 import sys
+import threading
+import webbrowser
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from manipnet import __version__, inputs, outputs
+from manipnet.common.command_line import Parser
 from manipnet.common.options import ConfigError, options_of
 from manipnet.common.text_output import accept_any_text
 from manipnet.config.files import check_files
@@ -27,27 +31,35 @@ from manipnet.config.settings import (
     server_config,
 )
 from manipnet.runtime.memory import check_address_space, share_arenas
-from manipnet.synthesis.model.shipped import BundleError
+from manipnet.runtime.start_progress import StartProgress
+from manipnet.synthesis.model.shipped import BundleError, version_text
 
-EPILOG = """examples:
-  manipnet-serve --demo                                   play a recorded performance, over and over
-  manipnet-serve --mesh Box=mug.obj                       track the bodies left_wrist, right_wrist and Box
-  manipnet-serve --rig stage.toml --look-ahead 0.1        read from a file which bodies are tracked
-  manipnet-serve --set bodies.left_wrist=3 --mesh 7=mug   name bodies by streaming id; use a mug of the library
-All options but --rig, --mesh, --hand, --set, --print-config and --log-format may also be in the [server] table of the
-rig file; the command line overrides the file."""
+if TYPE_CHECKING:
+    from manipnet.runtime.console import Console
+
+_log = logging.getLogger(__name__)
+
+EXAMPLES = (
+    "--demo --open                           play a recorded performance, and show it in the browser",
+    "--mesh Box=mug.obj                      track the bodies left_wrist, right_wrist and Box",
+    "--rig stage.toml --look-ahead 0.1       read from a file which bodies are tracked",
+    "--set bodies.left_wrist=3 --mesh 7=mug  name bodies by streaming id; use a mug of the library",
+)
+ABOUT = """Synthesise finger motion live from tracked wrists and objects.
+
+All options but --rig, --mesh, --hand, --set, --print-config, --open and --log-format may also be in the [server] table
+of the rig file; the command line overrides the file."""
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """The options of `manipnet-serve`."""
-    parser = argparse.ArgumentParser(
-        prog="manipnet-serve",
-        usage="manipnet-serve [options]",
-        description="Synthesise finger motion live from tracked wrists and objects.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = Parser("manipnet-serve", ABOUT, EXAMPLES)
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="print the version and the licences of the models, and exit"
     )
-    parser.add_argument("--version", action="version", version=f"manipnet {__version__}")
+    parser.add_argument(
+        "--open", action="store_true", help="open the live page in the browser when the server is ready"
+    )
     groups = {title: parser.add_argument_group(title) for title in (TRACKED, SYNTHESIS)}
     tracked = groups[TRACKED]
     tracked.add_argument("--rig", type=Path, metavar="FILE", help="rig file: which body is which wrist or prop")
@@ -97,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (ConfigError, BundleError) as error:
         print(f"manipnet-serve: {error}", file=sys.stderr)
         return 1
-    return _serve(config, arguments.log_format == "json")
+    return _serve(config, arguments.log_format == "json", arguments.open)
 
 
 def configure(arguments: argparse.Namespace) -> ServerConfig:
@@ -131,34 +143,71 @@ def describe(config: ServerConfig) -> str:
     return rig_text(config)
 
 
-def _serve(config: ServerConfig, json_log: bool) -> int:
-    share_arenas()
-    from manipnet.runtime.precompile import Precompiler
+class _Version(argparse.Action):
+    """Prints the version and the licences, which are read only then."""
 
-    precompiler = Precompiler()
-    precompiler.start()
-    from manipnet.net.curve_keys import KeyFileError
-    from manipnet.net.errors import ListenError
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(version_text("manipnet", __version__))
+        parser.exit()
+
+
+def _serve(config: ServerConfig, json_log: bool, opens_page: bool) -> int:
     from manipnet.runtime.console import Console
-    from manipnet.runtime.signals import stop_on_signals
-    from manipnet.server import Server
-    from manipnet.synthesis.hand.profile import ProfileError
-    from manipnet.synthesis.objects.mesh import MeshError
+    from manipnet.runtime.log_file import open_log_file
 
-    console = Console(as_json=json_log)
+    console = Console(as_json=json_log, log_file=open_log_file())
     logging.basicConfig(level=logging.WARNING, handlers=[console], force=True)
-    if not precompiler.idle:
-        logging.getLogger(__name__).warning("the first start takes about 20 s longer, since code is compiled once")
+    _log.setLevel(logging.INFO)
+    console.show("starting …")
     try:
-        with stop_on_signals() as stop:
-            server = Server(config, console.say, precompiler.wait)
-            server.run(stop.is_set)
-    except (ConfigError, BundleError, MeshError, ProfileError, KeyFileError, ListenError) as error:
-        print(f"manipnet-serve: {error}", file=sys.stderr)
-        return 1
+        return _serve_with(console, config, opens_page)
     finally:
         console.close()
+
+
+def _serve_with(console: "Console", config: ServerConfig, opens_page: bool) -> int:
+    share_arenas()
+    with StartProgress(console.show, _log.info, console.is_terminal) as progress:
+        from manipnet.runtime.precompile import Precompiler
+
+        precompiler = Precompiler()
+        precompiler.start()
+        if precompiler.idle:
+            progress.end()
+        else:
+            progress.begin()  # what is kept is that of another version
+        from manipnet.net.curve_keys import KeyFileError
+        from manipnet.net.errors import ListenError
+        from manipnet.runtime.signals import stop_on_signals
+        from manipnet.server import Server
+        from manipnet.synthesis.hand.profile import ProfileError
+        from manipnet.synthesis.objects.mesh import MeshError
+
+        def say(line: str) -> None:
+            progress.end()
+            if line.startswith("ready "):
+                console.show("")
+            console.say(line)
+            if opens_page and line.startswith("ready "):
+                open_page(line)
+
+        try:
+            with stop_on_signals() as stop:
+                server = Server(config, say, precompiler.wait, console.show)
+                server.run(stop.is_set)
+        except (ConfigError, BundleError, MeshError, ProfileError, KeyFileError, ListenError) as error:
+            progress.end()
+            console.show("")
+            print(f"manipnet-serve: {error}", file=sys.stderr)
+            return 1
     return 0
+
+
+def open_page(ready: str) -> None:
+    """Open the live page of the line `ready …` in the browser, without waiting for it."""
+    words = ready.split()[1:]
+    address = dict(zip(words[::2], words[1::2], strict=True))["page"]
+    threading.Thread(target=webbrowser.open, args=(address,), name="browser", daemon=True).start()
 
 
 if __name__ == "__main__":

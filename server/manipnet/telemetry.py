@@ -4,7 +4,6 @@ Every counter has one label. The counters are declared here, with the values tha
 add theirs with `Telemetry.declare` when they open. The sets are closed from then on, so a sender cannot make them grow.
 """
 
-import logging
 import threading
 import time
 from collections import Counter, deque
@@ -55,6 +54,8 @@ LABELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "messages_out": ("topic", ()),
     "control_requests": ("op", CONTROL_OPS),
     "recorded": ("fate", ("written", "lost")),
+    "record_triggers": ("fate", ("started", "stopped", "repeated", "ignored", "failed")),
+    "triggers_refused": ("reason", ("malformed", "oversized", "doctype", "not_allowed", "rate", "busy")),
     "page_frames": ("fate", ("shown", "skipped")),
     "page_ended": ("reason", ("crash",)),
 }
@@ -243,47 +244,3 @@ class StageClock:
         self._timings.record(stage, now_s - self._since_s)
         self.last_ms[stage] = 1e3 * (now_s - self._since_s)
         self._since_s = now_s
-
-
-class LogThrottle:
-    """Lets one log line per key pass in each interval and counts the lines that it holds back. Thread-safe."""
-
-    def __init__(self, interval_s: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self._interval_s, self._clock = interval_s, clock
-        self._lock = threading.Lock()
-        self._shown: dict[str, tuple[float, int]] = {}
-
-    def admit(self, key: str, n: int = 1) -> int | None:
-        """How many lines of this key were held back since the last one, if a line may be logged now; else None.
-
-        A line that may not be logged counts as `n` lines.
-        """
-        now_s = self._clock()
-        with self._lock:
-            shown_s, held_back = self._shown.get(key, (float("-inf"), 0))
-            if now_s - shown_s < self._interval_s:
-                self._shown[key] = (shown_s, held_back + n)
-                return None
-            self._shown[key] = (now_s, 0)
-            return held_back
-
-
-class RepeatFilter(logging.Filter):
-    """Lets each message template pass once per `interval_s`; the next line says how many more there were."""
-
-    def __init__(self, clock: Callable[[], float] = time.monotonic, interval_s: float = 5.0) -> None:
-        super().__init__()
-        self._throttle = LogThrottle(interval_s, clock)
-
-    def filter(self, record: logging.LogRecord) -> bool:
-        """Whether a record may pass; those below WARNING always do."""
-        if record.levelno < logging.WARNING:
-            return True
-        # The templates are literals in the source, so the number of keys stays small whatever arrives.
-        held_back = self._throttle.admit(f"{record.name}:{record.msg}")
-        if held_back is None:
-            return False
-        record.event = record.msg
-        if held_back:
-            record.msg = f"{record.msg} (and {held_back} more like it)"
-        return True

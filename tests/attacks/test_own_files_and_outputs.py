@@ -127,7 +127,7 @@ def test_a_closed_pipe_leaves_the_log_alive(tiny_bundle: Path, tmp_path: Path) -
 def test_doctor_writes_its_report_in_a_narrow_encoding(tmp_path: Path) -> None:
     report = tmp_path / "report.txt"
     environment = {**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
-    command = [sys.executable, "-m", "manipnet_tools.cli", "doctor", "--seconds", "0.5", "--control-port", "1"]
+    command = [sys.executable, "-m", "manipnet_tools.cli", "doctor", "--seconds", "0.5", "--server", "127.0.0.1:1"]
     with report.open("wb") as file:
         done = subprocess.run(command, stdout=file, stderr=subprocess.PIPE, env=environment, timeout=START_S)
     assert b"Error" not in done.stderr, done.stderr.decode(errors="replace")
@@ -147,7 +147,7 @@ def test_no_library_reports_home(tiny_bundle: Path, tmp_path: Path) -> None:
 
 def test_the_doctors_report_goes_into_a_file_of_any_encoding(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "manipnet_tools.cli", "doctor", "--seconds", "0.5"]
-    ports = ["--input-port", "0", "--osc-port", "0", "--control-port", "1"]
+    ports = ["--input-port", "0", "--osc-port", "0", "--server", "127.0.0.1:1"]
     narrow = {**os.environ, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
     with open(tmp_path / "report.txt", "wb") as report:
         ended = subprocess.run(

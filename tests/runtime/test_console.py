@@ -13,6 +13,8 @@ import pytest
 
 from manipnet.common.text_output import accept_any_text
 from manipnet.runtime.console import Console
+from manipnet.runtime.log_file import open_log_file
+from manipnet.runtime.terminal import Terminal, ready_table
 
 
 @contextmanager
@@ -97,3 +99,87 @@ def test_nothing_takes_the_place_of_a_closed_standard_stream(closed: str, tmp_pa
     streams = " ".join(f"{stream}>&-" for stream in closed)
     program = ["sh", "-c", f'exec "$0" "$@" {streams}', sys.executable, "-c", OPEN_A_FILE]
     assert subprocess.run(program, cwd=tmp_path, check=False).returncode > 2
+
+
+class Screen:
+    """A terminal of 80 columns that keeps what a person sees: the lines, of which the last may be rewritten."""
+
+    def __init__(self) -> None:
+        self.lines = [""]
+
+    def write(self, text: str) -> None:
+        for letter in text:
+            if letter == "\n":
+                self.lines.append("")
+                self._at = 0
+            elif letter == "\r":
+                self._at = 0
+            else:
+                line = self.lines[-1].ljust(self._at)
+                self.lines[-1] = line[: self._at] + letter + line[self._at + 1 :]
+                self._at += 1
+
+    _at = 0
+
+    def flush(self) -> None:
+        pass
+
+
+def test_a_terminal_has_one_status_line_below_the_lines():
+    screen = Screen()
+    terminal = Terminal(screen)  # pyright: ignore[reportArgumentType]
+    terminal.status("60 hands/s | left live mug")
+    terminal.status("59 hands/s | left rest")
+    terminal.line("left rest")
+    terminal.status("x" * 200)
+    assert [line.rstrip() for line in screen.lines] == ["left rest", "x" * 78 + "…"]
+    terminal.status("日本" * 60)
+    assert sum(2 if letter in "日本" else 1 for letter in screen.lines[-1].rstrip()) < 80
+    terminal.status("")
+    terminal.line("stopped")
+    assert [line.rstrip() for line in screen.lines] == ["left rest", "stopped", ""]
+
+
+def test_the_addresses_are_a_table_with_the_page_first():
+    lines = ready_table(
+        "ready hands tcp://127.0.0.1:5555 bodies tcp://127.0.0.1:5556 page http://127.0.0.1:8080", "a b.log"
+    )
+    assert [line.split()[:2] for line in lines[1:4]] == [
+        ["page", "http://127.0.0.1:8080"],
+        ["bodies", "tcp://127.0.0.1:5556"],
+        ["hands", "tcp://127.0.0.1:5555"],
+    ]
+    assert "  log: a b.log" in lines
+    assert all(len(line) < 80 for line in lines)
+
+
+def test_a_pipe_gets_plain_lines_and_the_log_file_everything(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    with outputs(monkeypatch, tmp_path) as (read, _):
+        file = open_log_file()
+        assert file is not None
+        console = Console(log_file=file)
+        console.say("ready page http://127.0.0.1:8080")
+        console.show("60 hands/s")
+        log(console, "a warning")
+        console.close()
+        os.set_blocking(read, False)
+        assert os.read(read, 4096) == b"ready page http://127.0.0.1:8080" + os.linesep.encode()
+        os.close(read)
+    text = Path(file.baseFilename).read_text(encoding="utf-8")
+    assert "INFO manipnet: ready page" in text
+    assert "WARNING manipnet: a warning" in text
+
+
+def test_old_log_files_are_deleted(monkeypatch, tmp_path):
+    monkeypatch.setattr("manipnet.runtime.log_file.log_folder", lambda: tmp_path)
+    for day in range(1, 20):
+        (tmp_path / f"server 2026-01-{day:02d} 10.00.00 1.log").touch()
+        (tmp_path / f"server 2026-01-{day:02d} 10.00.00 1.log.1").touch()
+    file = open_log_file()
+    assert file is not None
+    file.emit(logging.LogRecord("manipnet", logging.INFO, "", 0, "begun", None, None))
+    file.close()
+    left = sorted(tmp_path.glob("server *.log"))
+    assert len(left) == 10
+    assert not (tmp_path / "server 2026-01-01 10.00.00 1.log.1").exists()

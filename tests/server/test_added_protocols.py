@@ -222,7 +222,7 @@ def test_doctor_and_rig_init_listen_to_it(
     port = free_port(socket.SOCK_DGRAM)
     ports = ["--input-port=0", "--osc-port=0", f"--pigeon-port={port}"]
     with Flight(port):
-        control = f"--control-port={free_port(socket.SOCK_STREAM)}"
+        control = f"--server=127.0.0.1:{free_port(socket.SOCK_STREAM)}"
         assert doctor.main([*ports, control, "--seconds=1"]) == 1
         output = capsys.readouterr().out
         names = ["--left-wrist=left_wrist", "--right-wrist=right_wrist"]

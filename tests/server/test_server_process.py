@@ -22,7 +22,7 @@ CUBE = LIBRARY_FOLDER / "cube.ply"
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals for another process")
 def test_ready_names_every_address_and_a_signal_ends_it_with_status_0(tiny_bundle: Path, how: int) -> None:
     with serving("--model", str(tiny_bundle), "--metrics-port", "0") as server:
-        assert list(server.addresses) == ["hands", "web", "bodies", "osc", "control", "page", "metrics"]
+        assert list(server.addresses) == ["hands", "web", "bodies", "osc", "control", "page", "trigger", "metrics"]
         with urllib.request.urlopen(server.addresses["metrics"], timeout=20.0) as response:
             text = response.read().decode()
         assert 'manipnet_frames_in_total{source="zmq"} 0.0' in text

@@ -8,6 +8,8 @@ from typing import Any
 
 from manipnet import __version__
 from manipnet.common.text_output import accept_any_text
+from manipnet.synthesis.model.shipped import version_text
+from manipnet_tools.commands.arguments import parsed, parser_for
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ VERBS = {
         "manipnet_tools.commands.replay",
         f"{_OPTIONS}.ReplayOptions",
         (
-            "takes/mug1 --to tcp://127.0.0.1:5556             to a server on this machine",
-            "take.mcap --to tcp://127.0.0.1:5556 --loop       repeat a recording until stopped",
+            "takes/mug1                                       to the server on this machine",
+            "take.mcap --server 192.168.1.7 --loop            repeat a recording until stopped",
             "motive.csv --to osc://127.0.0.1 --speed 0.5      an export of Motive, over OSC, at half speed",
         ),
     ),
@@ -42,6 +44,7 @@ VERBS = {
         f"{_OPTIONS}.RecordOptions",
         (
             "--out take.mcap                          beside a running server, until Ctrl-C",
+            "--out take.mcap --server 192.168.1.7     beside a server on another machine",
             "--out take.mcap --rig stage.toml         keep the rig and its meshes in the recording",
             "--out take.mcap --bodies-port 5556       without a server: the bodies that a tracker sends",
         ),
@@ -58,7 +61,7 @@ VERBS = {
         f"{_OPTIONS}.SynthesizeOptions",
         (
             "takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz",
-            "take.mcap --mesh Box=hammer.obj --out hammer.npz       the same take with another object",
+            "take.mcap --mesh Box=hammer --out hammer.npz           the same take with an object of the library",
             "motive.csv --rig stage.toml --out fingers.npz          an export of Motive with a calibrated rig",
         ),
     ),
@@ -131,12 +134,6 @@ VERBS = {
     "doctor": Verb(
         "find out why no tracked bodies arrive",
         "manipnet_tools.doctor.command",
-        None,
-        (
-            "                                listen where the server would, for 5 s",
-            "--rig stage.toml                also report which bodies of the rig are missing",
-            "--natnet 192.168.1.5            also ask Motive at this address",
-        ),
     ),
     "rig": Verb(
         "write a rig file from the bodies that arrive, or print a configuration", "manipnet_tools.commands.rig"
@@ -157,7 +154,7 @@ VERBS = {
 EXAMPLES = """examples:
   manipnet serve --demo
   manipnet serve --mesh Box=mug.obj --look-ahead 0.1
-  manipnet replay takes/mug1 --to tcp://127.0.0.1:5556 --loop
+  manipnet replay takes/mug1 --loop
   manipnet record --out take.mcap
   manipnet synthesize takes/mug1 --mesh mug1=meshes/mug1.obj --out fingers.npz
   manipnet batch takes --mesh mug1=meshes/mug1.obj --out fingers
@@ -178,7 +175,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(help_text())
         return 0 if arguments else 2
     if arguments[0] == "--version":
-        print(f"manipnet {__version__}")
+        print(version_text("manipnet", __version__))
         return 0
     name, *rest = arguments
     if name not in VERBS:
@@ -216,26 +213,19 @@ def _guarded(name: str, rest: list[str]) -> int:
 
 
 def _run(name: str, verb: Verb, rest: list[str]) -> int:
-    try:
-        if verb.options is None:
-            return importlib.import_module(verb.module).main(rest) or 0
-        options = _parsed(name, verb.options, rest)
-        options.check()
-    except SystemExit as end:
-        if not end.code and verb.examples:
-            print("\nexamples:", *(f"  manipnet {name} {example}" for example in verb.examples), sep="\n")
-        raise
+    if verb.options is None:
+        return importlib.import_module(verb.module).main(rest) or 0
+    kind = options_class(verb.options)
+    options = parsed(kind, parser_for(kind, f"manipnet {name}", verb.examples), rest)
+    options.check()
     importlib.import_module(verb.module).run(options)
     return 0
 
 
-def _parsed(name: str, options: str, rest: list[str]) -> Any:
-    """The arguments of a verb as a value of the class `options`."""
-    import tyro
-
-    module, _, kind = options.rpartition(".")
-    kind = getattr(importlib.import_module(module), kind)
-    return tyro.cli(kind, prog=f"manipnet {name}", args=rest, config=(tyro.conf.FlagCreatePairsOff,))
+def options_class(name: str) -> Any:
+    """The class of options with that full name."""
+    module, _, kind = name.rpartition(".")
+    return getattr(importlib.import_module(module), kind)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
 """Checks that files exist. They need no library, so that a mistyped path is reported before anything loads."""
 
+import difflib
 from pathlib import Path
 
 from manipnet.common.options import ConfigError
 from manipnet.config.settings import ServerConfig
 from manipnet.synthesis.model.shipped import find_bundle
+from manipnet.synthesis.objects.library import library_names
 
 
 def check_files(config: ServerConfig) -> None:
@@ -13,7 +15,7 @@ def check_files(config: ServerConfig) -> None:
     for actor in config.actors:
         require_file(actor.hand)
         for prop in actor.objects:
-            require_file(prop.mesh)
+            require_mesh(prop.mesh)
 
 
 def require_file(path: Path | None) -> None:
@@ -24,3 +26,19 @@ def require_file(path: Path | None) -> None:
         path.open("rb").close()
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def require_mesh(path: Path, where: str = "") -> None:
+    """Raise `ConfigError` unless the mesh file can be opened. `where` is the option or key that names it."""
+    prefix = f"{where}: " if where else ""
+    if not path.suffix and not path.exists():
+        names = library_names()
+        near = difflib.get_close_matches(path.name, names, 1)
+        guess = f" (did you mean {near[0]}?)" if near else ""
+        raise ConfigError(
+            f"{prefix}{path} is neither a file nor an object of the library{guess}, which has {', '.join(names)}"
+        )
+    try:
+        require_file(path)
+    except ConfigError as error:
+        raise ConfigError(f"{prefix}{error}") from None

@@ -9,6 +9,7 @@ from manipnet import inputs, outputs
 from manipnet.common.options import (
     Choice,
     ConfigError,
+    Endpoint,
     Folder,
     Network,
     Networks,
@@ -21,6 +22,7 @@ from manipnet.common.options import (
     from_keys,
     option,
     options_of,
+    parse_endpoint,
 )
 from manipnet.net.addresses import is_loopback
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER, SOLVERS
@@ -39,6 +41,10 @@ MAX_ACTORS: Final = 16
 MAX_OBJECTS: Final = 32
 SCALE_RANGE: Final = (0.2, 5.0)
 """Allowed scale factors of a hand."""
+
+CONTROL_PORT: Final = 5557
+TRIGGER_PORT: Final = 1512
+"""Where Motive sends its remote trigger: its command port plus 2."""
 
 TRACKED: Final = "what is tracked"
 SYNTHESIS: Final = "how the fingers are synthesised"
@@ -121,10 +127,19 @@ class ServerConfig:
         group=SYNTHESIS,
     )
     host: str = option("127.0.0.1", Text("ADDRESS"), "address of this machine to listen on", group=SERVER)
-    control_port: int = option(5557, Port(), "TCP port for control requests (ZeroMQ REP)", group=SERVER)
+    control_port: int = option(CONTROL_PORT, Port(), "TCP port for control requests (ZeroMQ REP)", group=SERVER)
     page_port: int = option(8080, Port(), "TCP port of the live page (HTTP and WebSocket)", group=SERVER)
     metrics_port: int | None = option(
         None, Port(), "TCP port of metrics for Prometheus (HTTP); by default no metrics are served", group=SERVER
+    )
+    trigger_port: int = option(
+        TRIGGER_PORT, Port(), "UDP port on which Motive's remote trigger begins and ends recordings", group=SERVER
+    )
+    trigger_host: str = option(
+        "127.0.0.1",
+        Text("ADDRESS"),
+        "address of this machine for that port; 0.0.0.0 for the broadcast of a Motive on another machine",
+        group=SERVER,
     )
     keys: Path | None = option(
         None, Folder(), "let only clients with keys connect over ZeroMQ; `manipnet keys` makes the keys", group=SERVER
@@ -193,6 +208,11 @@ def default_actor(objects: tuple[ObjectConfig, ...] = ()) -> ActorConfig:
     return ActorConfig("actor", {wrist: BodyConfig(wrist) for wrist in WRISTS}, objects)
 
 
+def control_endpoint(text: str) -> Endpoint:
+    """The control port of a server from `HOST`, `HOST:PORT` or `tcp://HOST:PORT`. Raises `ConfigError`."""
+    return parse_endpoint(text.removeprefix("tcp://"), CONTROL_PORT)
+
+
 def parse_object(text: str) -> ObjectConfig:
     """The prop of `--mesh NAME=FILE`: the body NAME carries the mesh FILE. Raises `ConfigError`."""
     name, mesh = parse_mesh(text)
@@ -219,6 +239,12 @@ def check(config: ServerConfig) -> None:
             f"--host {config.host} can be reached from other machines, and nothing keeps strangers out. Give "
             "--keys FOLDER for ZeroMQ (see `manipnet keys`) and --allow NETWORK for OSC; or stay on 127.0.0.1 and use "
             "a tunnel (ssh -L); or add --insecure on a network that you trust"
+        )
+    if not (is_loopback(config.trigger_host) or config.allow or config.insecure):
+        raise ConfigError(
+            f"--trigger-host {config.trigger_host} can be reached from other machines, any of which could begin and "
+            "end recordings. Give --allow NETWORK with the network of Motive's machine, or --insecure on a network "
+            "that you trust"
         )
     _check_actors(config.actors)
 

@@ -6,13 +6,11 @@ from typing import Any, Final
 
 import zmq
 
-from manipnet.common.options import parse_endpoint
-from manipnet.config.settings import all_options
+from manipnet.config.settings import control_endpoint
 from manipnet.control.request import RequestError
 from manipnet.net.curve_keys import read_client_keys
 from manipnet.net.zmq_socket import connect, tcp_address
 
-CONTROL_PORT: Final = all_options()["control_port"].default
 ANSWER_S: Final = 10.0
 
 
@@ -24,7 +22,7 @@ class ControlClient:
 
         Raises `ConfigError` for a malformed address and `KeyFileError` for a malformed key file.
         """
-        self._endpoint = parse_endpoint(address.removeprefix("tcp://"), CONTROL_PORT)
+        self._endpoint = control_endpoint(address)
         self._keys = None if keys is None else read_client_keys(keys)
         self._timeout_s = timeout_s
 

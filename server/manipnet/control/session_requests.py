@@ -27,6 +27,7 @@ from manipnet.runtime.object_catalog import ObjectCatalog
 from manipnet.runtime.status import status
 from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
+from manipnet.synthesis.model.shipped import NO_LICENCE
 from manipnet.synthesis.objects.mesh import MeshError
 from manipnet.synthesis.objects.units import UNITS_M
 from manipnet.telemetry import Telemetry
@@ -75,6 +76,7 @@ class SessionRequests:
             "session": self._session,
             "model": self._bundle.name,
             "model_hash": self._bundle.model_hash,
+            "licence": self._bundle.meta.get("licence", NO_LICENCE),
             "solver": self._solver,
             "tick_hz": TICK_HZ,
             "actors": [actor.config.name for actor in self._actors],

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from manipnet.inputs.base import Sink
     from manipnet.net.curve_keys import ServerKeys
     from manipnet.telemetry import Telemetry
+    from manipnet.wire.record_trigger import RecordTrigger
 
 INPUTS: tuple[Input, ...] = (ZEROMQ, OSC, NATNET)
 """A new protocol takes one file or folder in this package, and one entry in this tuple."""
@@ -28,6 +29,7 @@ def make_receivers(
     keys: "ServerKeys | None" = None,
     allow: tuple[Network, ...] = (),
     bodies: frozenset[int | str] = frozenset(),
+    record: "Callable[[RecordTrigger], object] | None" = None,
 ) -> dict[Input, Receiver]:
     """A receiver for every input that its options, which `options_of` finds by their class, turn on.
 
@@ -37,7 +39,7 @@ def make_receivers(
     for declared in INPUTS:
         options = options_of(declared.options)
         if declared.is_on(options):
-            reception = Reception(declared.intake(sink, telemetry), host, keys, allow, bodies)
+            reception = Reception(declared.intake(sink, telemetry), host, keys, allow, bodies, record)
             made[declared] = declared.open(options, reception)
             telemetry.add_gauges(made[declared].gauges)
     return made

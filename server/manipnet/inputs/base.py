@@ -3,7 +3,8 @@
 import logging
 from collections.abc import Callable, Iterable
 
-from manipnet.telemetry import LogThrottle, Telemetry
+from manipnet.common.log_limits import LogThrottle
+from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame
 
 LOG_PERIOD_S = 1.0

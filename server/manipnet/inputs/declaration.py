@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from manipnet.inputs.playback import BodySender
     from manipnet.net.curve_keys import ServerKeys
     from manipnet.telemetry import Gauge, Telemetry
+    from manipnet.wire.record_trigger import RecordTrigger
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,8 @@ class Reception:
     """The networks that may send; empty if any may."""
     bodies: frozenset[int | str] = frozenset()
     """The bodies of the rig by id or name. They help to read names that are not written in UTF-8."""
+    record: "Callable[[RecordTrigger], object] | None" = None
+    """Takes the triggers of recordings that arrive among the bodies; None if nothing is recorded."""
 
 
 class Receiver:

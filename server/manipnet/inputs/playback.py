@@ -15,6 +15,7 @@ import msgpack
 import zmq
 
 from manipnet.inputs.osc.writer import osc_datagrams
+from manipnet.net.curve_keys import ClientKeys
 from manipnet.net.zmq_socket import connect, tcp_address
 from manipnet.wire.bodies import BodyFrame, bodies_map
 
@@ -40,8 +41,10 @@ class BodySender(Protocol):
 class ZmqBodySender:
     """Sends msgpack messages through a publishing socket that connects to the receiver."""
 
-    def __init__(self, host: str, port: int, stopping: threading.Event | None = None) -> None:
-        """Connect, and wait until the receiver has subscribed.
+    def __init__(
+        self, host: str, port: int, stopping: threading.Event | None = None, keys: ClientKeys | None = None
+    ) -> None:
+        """Connect, with the `keys` that the receiver may require, and wait until it has subscribed.
 
         Raises `PlayError` if it has not within `CONNECT_S`, or when `stopping` is set.
         """
@@ -49,7 +52,7 @@ class ZmqBodySender:
         address = tcp_address((host, port))
         try:
             # XPUB also receives the subscriptions. What is sent before the first one would be lost.
-            self._socket = connect(self._context, zmq.XPUB, (host, port), high_water_mark=WAITING_FRAMES)
+            self._socket = connect(self._context, zmq.XPUB, (host, port), keys, high_water_mark=WAITING_FRAMES)
         except zmq.ZMQError as error:
             self._context.term()
             raise PlayError(f"cannot connect to {address}: {zmq.strerror(error.errno or 0)}") from None

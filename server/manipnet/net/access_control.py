@@ -9,10 +9,11 @@ from typing import Any, Final
 import zmq
 from zmq.utils.monitor import parse_monitor_message
 
+from manipnet.common.log_limits import LogThrottle
 from manipnet.net.connection_limits import Connections
 from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.zap import DOMAIN, ZAP_ADDRESS, ClientList, open_door, secure_server
-from manipnet.telemetry import LogThrottle, Telemetry
+from manipnet.telemetry import Telemetry
 
 MOST_CONNECTIONS: Final = 64
 HANDSHAKE_MS: Final = 5_000

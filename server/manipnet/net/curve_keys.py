@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+from manipnet.common.atomic_file import replacing
 from manipnet.common.file_names import is_device
 
 SERVER_FILE = "server.toml"
@@ -55,17 +56,22 @@ class ClientKeys:
     server_public: str
 
 
-def make_server_keys(folder: Path) -> ServerKeys:
-    """Make the server's pair in `folder`. Raises `KeyFileError` if there is one already."""
+def make_server_keys(folder: Path, replace: bool = False) -> ServerKeys:
+    """Make the server's pair in `folder`. Raises `KeyFileError` if there is one already that is not to be replaced."""
     folder.mkdir(parents=True, exist_ok=True)
     pair = _new_pair()
+    if replace:
+        (folder / SERVER_FILE).unlink(missing_ok=True)
     _write_secret(folder / SERVER_FILE, {"public": pair.public, "secret": pair.secret})
     _create_private(folder / ALLOW_FILE, os.O_APPEND).close()
     return ServerKeys(pair, folder / ALLOW_FILE)
 
 
-def make_client_keys(folder: Path, name: str) -> Path:
-    """Make a client's file in `folder` and add the client to the list. Raises `KeyFileError`."""
+def make_client_keys(folder: Path, name: str, replace: bool = False) -> Path:
+    """Make a client's file in `folder` and add the client to the list. Raises `KeyFileError`.
+
+    With `replace`, the keys that the client had before are revoked.
+    """
     usable = re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", name) and not is_device(name)
     if not usable or f"{name}.toml" == SERVER_FILE:
         raise KeyFileError(
@@ -74,6 +80,9 @@ def make_client_keys(folder: Path, name: str) -> Path:
         )
     server, pair = read_server_keys(folder), _new_pair()
     path = folder / f"{name}.toml"
+    if replace:
+        path.unlink(missing_ok=True)
+        _revoke(folder / ALLOW_FILE, name)
     _write_secret(
         path, {"name": name, "public": pair.public, "secret": pair.secret, "server_public": server.pair.public}
     )
@@ -124,6 +133,13 @@ def read_allow_list(path: Path) -> dict[str, str]:
     return listed
 
 
+def _revoke(allow_file: Path, name: str) -> None:
+    """Take the keys of a client off the list."""
+    lines = allow_file.read_text(encoding="ascii").splitlines(keepends=True)
+    with replacing(allow_file) as file:
+        file.writelines(line.encode("ascii") for line in lines if line.strip().partition(" ")[2].strip() != name)
+
+
 def _new_pair() -> KeyPair:
     import zmq  # reading keys, and the command line about keys, take no ZeroMQ
 
@@ -138,7 +154,7 @@ def _write_secret(path: Path, values: dict[str, str]) -> None:
     try:
         file = _create_private(path, os.O_EXCL)
     except FileExistsError:
-        raise KeyFileError(f"{path} already exists; delete it first to replace its key") from None
+        raise KeyFileError(f"{path}: already exists; give another name, or --force to replace it") from None
     with file:
         file.writelines(f'{key} = "{value}"\n' for key, value in values.items())
 

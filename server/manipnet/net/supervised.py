@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Any, Final
 
-from manipnet.telemetry import LogThrottle, Telemetry
+from manipnet.common.log_limits import LogThrottle
+from manipnet.telemetry import Telemetry
 
 FIRST_PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 5.0

@@ -1,11 +1,9 @@
 """The requests `record`, `stop_recording` and `recordings`: one recording at a time, in the folder of the takes."""
 
 import json
-import re
 import shutil
 import sys
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -15,9 +13,9 @@ from manipnet.actors.props import Prop
 from manipnet.common.file_names import is_device, is_encodable
 from manipnet.control.request import Handler, Request, RequestError
 from manipnet.recording.open_recording import OpenRecording, RecordingFailedError
+from manipnet.recording.take_names import NAME, free_path, safe_name, time_name
 from manipnet.telemetry import Telemetry
 
-NAME: Final = re.compile(r"\w([\w .-]{0,62}[\w-])?")
 MIN_FREE_BYTES: Final = 64 << 20
 """Space for a recording to begin: about a minute of one actor."""
 
@@ -32,10 +30,12 @@ class Recorder:
         self._folder, self._about, self._telemetry = folder, about, telemetry
         self._open: OpenRecording | None = None
         self._lock = threading.Lock()
+        self.finished: list[str] = []
+        """The file names of the recordings that were finished in this session."""
 
     def note(self, payload: bytes) -> None:
         """Record a hands message, given as msgpack, if a recording is in progress; returns at once."""
-        recording = self._current()
+        recording = self.current()
         if recording is not None:
             recording.note(payload)
 
@@ -48,12 +48,33 @@ class Recorder:
         with suppress(RequestError):
             self._stop_recording({})
 
-    def _current(self) -> OpenRecording | None:
+    @property
+    def folder(self) -> Path:
+        """The folder of the recordings."""
+        return self._folder.resolve()
+
+    def current(self) -> OpenRecording | None:
+        """The recording in progress. From any thread."""
         recording = self._open
         return None if recording is None or recording.is_broken else recording
 
+    def begin(self, name: str, about: Mapping[str, str]) -> Path:
+        """Begin a recording under a name that resembles the given one, and return its file.
+
+        `about` is added to its metadata. Raises `RequestError`.
+        """
+        with self._lock:
+            self._check_space()
+            path = free_path(self._folder, safe_name(name, self._folder))
+            self._open = self._begin(path, about)
+        return path
+
+    def finish(self) -> dict[str, Any]:
+        """End the recording in progress. Raises `RequestError`."""
+        return self._stop_recording({})
+
     def _record(self, request: Request) -> dict[str, Any]:
-        name = request.get("name", time.strftime("take %Y-%m-%d %H.%M.%S"))
+        name = request.get("name", time_name())
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise RequestError(
                 f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
@@ -68,7 +89,7 @@ class Recorder:
                 "use ASCII letters, or start the server with PYTHONUTF8=1"
             )
         with self._lock:
-            if (recording := self._current()) is not None:
+            if (recording := self.current()) is not None:
                 raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
             self._check_space()
             if path.exists():
@@ -86,7 +107,7 @@ class Recorder:
                 f"{MIN_FREE_BYTES >> 20} MB to begin; make room, or start the server with --takes on another disk"
             )
 
-    def _begin(self, path: Path) -> OpenRecording:
+    def _begin(self, path: Path, more: Mapping[str, str] | None = None) -> OpenRecording:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -95,6 +116,7 @@ class Recorder:
             ) from None
         metadata, props = self._about()
         meshes = {prop.name: (prop.shape.mesh.vertices, prop.shape.mesh.faces, prop.scale) for prop in props}
+        metadata = {**metadata, **(more or {})}
         return OpenRecording(path, metadata, meshes, self._telemetry)
 
     def _stop_recording(self, _: Request) -> dict[str, Any]:
@@ -106,10 +128,11 @@ class Recorder:
                 counts = recording.finish()
             except RecordingFailedError as error:
                 raise RequestError(str(error)) from None
+            self.finished.append(recording.path.name)
         return {"name": recording.path.name, "seconds": recording.seconds, **counts}
 
     def _recordings(self, _: Request) -> dict[str, Any]:
-        recording = self._current()
+        recording = self.current()
         files = sorted(self._folder.glob("*.mcap"), key=_changed_s, reverse=True)
         return {
             "folder": str(self._folder.resolve()),

@@ -4,7 +4,7 @@ import logging
 from collections.abc import Mapping
 from typing import Any, Final
 
-from manipnet.telemetry import LogThrottle
+from manipnet.common.log_limits import LogThrottle
 
 LASTS_LOOKS: Final = 6
 """A clock must be wrong for this many seconds before a line is logged: a replay that begins again is right soon, and so

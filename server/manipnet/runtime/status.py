@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 from manipnet.actors.actor import Actor
@@ -12,45 +13,81 @@ from manipnet.config.settings import BodyKey
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import BodyHealth
 
+WAITING: Final = "waiting for bodies: none of the rig yet (`manipnet doctor` says why)"
 WARN_AFTER_S: Final = 3.0
 ERROR_AFTER_S: Final = 10.0
 DELAY_PERCENTILES: Final = {"p50": 50.0, "p99": 99.0, "p99.9": 99.9, "max": 100.0}
 _log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, slots=True)
+class Second:
+    """One second of a server: the line that describes it, and what has changed since the last change."""
+
+    status: str
+    changes: tuple[str, ...]
+
+
 class SecondLines:
-    """Describes each second of a server in one line."""
+    """Describes each second of a server in one line, and its changes in lines of their own."""
 
     def __init__(self, actors: Sequence[Actor], telemetry: Telemetry) -> None:
         self._actors, self._telemetry = actors, telemetry
         self._messages = 0
+        self._reported: dict[str, str] | None = None
+        self._before: dict[str, str] = {}
 
-    def next(self) -> str:
-        """What is down, the rate, the delay, both hands of each actor, and what was lost; call this once per second."""
+    def next(self) -> Second:
+        """The rate, the delay, both hands of each actor, and what is down; call this once per second.
+
+        A hand whose state flickers is not a change until the state has lasted for a second.
+        """
         down = [f"{name.upper()} IS DOWN" for name in down_receivers(self._telemetry)]
-        return " | ".join([*down, self._describe()])
+        return Second(" | ".join([*down, self._describe()]), self._changes())
 
     def _describe(self) -> str:
         messages = sum(actor.seq for actor in self._actors)
         rate_hz, self._messages = messages - self._messages, messages
-        if not any(actor.receiving for actor in self._actors):
-            return "waiting for bodies: no body of the rig has arrived yet (`manipnet doctor` tells why)"
-        p50_s, p99_s = self._telemetry.timings.recent("total", 50, 99)
-        look_ahead_ms = 1e3 * max(actor.look_ahead_s for actor in self._actors)
-        counts = self._telemetry.counts()
-        dropped = sum(sum(counts.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
-        return " | ".join(
-            [
-                f"{rate_hz:5.1f} frames/s",
-                f"delay {look_ahead_ms:.0f} + {1e3 * p50_s:.1f} ms (p99 {1e3 * p99_s:.1f})",
-                *(self._hands(actor) for actor in self._actors),
-                f"dropped {dropped}",
-            ]
-        )
+        if not self._is_receiving():
+            return WAITING
+        p50_s = self._telemetry.timings.recent("total", 50)[0]
+        look_ahead_s = max(actor.look_ahead_s for actor in self._actors)
+        hands = [f"{self._name(actor)}{', '.join(map(_hand, actor.hands.values()))}" for actor in self._actors]
+        return " | ".join([f"{rate_hz:.0f} hands/s", f"delay {1e3 * (look_ahead_s + p50_s):.0f} ms", *hands])
 
-    def _hands(self, actor: Actor) -> str:
-        name = f"{actor.config.name}: " if len(self._actors) > 1 else ""
-        return name + ", ".join(_hand(hand) for hand in actor.hands.values())
+    def _changes(self) -> tuple[str, ...]:
+        now = self._state()
+        if self._reported is None:
+            self._reported = {}
+            new = now
+        else:
+            lasting = now.items() & self._before.items()
+            new = {what: text for what, text in lasting if self._reported.get(what) != text}
+        self._before = now
+        self._reported |= new
+        return tuple(new[what] for what in now if what in new)
+
+    def _state(self) -> dict[str, str]:
+        """What a change is reported of, in words."""
+        down, known = down_receivers(self._telemetry), self._reported or {}
+        sockets = {f"socket {name}": f"{name} is down" for name in down}
+        sockets |= {
+            key: f"{key[7:]} listens again" for key in known if key.startswith("socket ") and key not in sockets
+        }
+        if not self._is_receiving():
+            return {**sockets, "bodies": WAITING}
+        hands = {
+            f"{actor.config.name} {hand.side}": f"{self._name(actor)}{_hand(hand)}"
+            for actor in self._actors
+            for hand in actor.hands.values()
+        }
+        return {**sockets, "bodies": "bodies arrive", **hands}
+
+    def _is_receiving(self) -> bool:
+        return any(actor.receiving for actor in self._actors)
+
+    def _name(self, actor: Actor) -> str:
+        return f"{actor.config.name}: " if len(self._actors) > 1 else ""
 
 
 def status(actors: Sequence[Actor], telemetry: Telemetry, now_s: float) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from manipnet.common.options import ConfigError
 from manipnet.config.settings import ServerConfig, check
 from manipnet.jit import seal_cache
 from manipnet.net.curve_keys import read_server_keys
+from manipnet.recording.recording_lines import RecordingLines
 from manipnet.runtime.clock_watch import ClockWatch
 from manipnet.runtime.run_file import announce, withdraw
 from manipnet.runtime.status import SecondLines, SilenceWatch
@@ -41,17 +42,19 @@ class Server:
         config: ServerConfig,
         say: Callable[[str], None] = _log.info,
         wait_for_kernels: Callable[[], object] = lambda: None,
+        show: Callable[[str], None] = lambda status: None,
     ) -> None:
         """Load the model, the objects and the keys; nothing listens yet.
 
-        `say` shows a line to a person: `ready` with all addresses, and then one line per second. It must return at
-        once. `wait_for_kernels` returns when another process has compiled kernels that this one would compile
-        otherwise. Raises `ConfigError`, `KeyFileError`, `BundleError` and `MeshError`.
+        `say` shows a line to a person: `ready` with all addresses, then one for each change, and at the end what was
+        kept. `show` shows the state of each second in place of that of the last. Both must return at once.
+        `wait_for_kernels` returns when another process has compiled kernels that this one would compile otherwise.
+        Raises `ConfigError`, `KeyFileError`, `BundleError` and `MeshError`.
         """
         check(config)
         self.addresses: dict[str, str] = {}
         """The address of every socket by what it carries, while the server runs."""
-        self._say = say
+        self._say, self._show = say, show
         self._keys = None if config.keys is None else read_server_keys(config.keys)
         self._session = Session(config, wait_for_kernels)
         self._seconds = SecondLines(self._session.actors, self._session.telemetry)
@@ -68,7 +71,7 @@ class Server:
         seal_cache()
         with ExitStack() as opened:
             services = open_services(self._session, self._keys, opened)
-            self.addresses = services.addresses
+            self.addresses, self._recordings = services.addresses, RecordingLines(services.recorder)
             sys.setswitchinterval(SWITCH_INTERVAL_S)
             gc.collect()
             gc.freeze()
@@ -85,6 +88,7 @@ class Server:
                 opened.callback(self._demo.stop)
                 self._demo.start(self.addresses["bodies"])
             services.loop.run(stopping, self._every_second)
+        self._say(f"stopped; {self._recordings.kept()}")
 
     def _load_demo(self) -> "Demo":
         from manipnet.demo.player import Demo  # its libraries are of no use to a live session
@@ -94,6 +98,9 @@ class Server:
         return Demo()
 
     def _every_second(self, now_s: float) -> None:
-        self._say(self._seconds.next())
+        second, recording = self._seconds.next(), self._recordings.next()
+        for change in (*second.changes, *recording.changes):
+            self._say(change)
+        self._show(" | ".join(filter(None, (recording.status, second.status))))
         self._silence.look(self._session.actors, now_s)
         self._clocks.look(self._session.senders.report(now_s), self._session.telemetry.counts())

@@ -64,6 +64,8 @@ class Session:
         """Where the receivers leave frames."""
         self.peers = Peers(self.senders)
         self.telemetry.add_gauges(self.peers.gauges)
+        self.addresses: dict[str, str] = {}
+        """The address of every socket by what it carries, once they are open."""
 
     def warm_up(self) -> None:
         """Run every shape through a tick loop once."""
@@ -92,12 +94,15 @@ class Session:
         ).handlers()
         hands = HandRequests(self._proxy, self.avatars, self.bundle.hand).handlers()
         calibration = CalibrationRequests(self._proxy, self.config.rig).handlers()
-        own = requests["status"]
+        own_hello, own_status = requests["hello"], requests["status"]
+
+        def hello(request: Request) -> dict[str, Any]:
+            return {**own_hello(request), "addresses": dict(self.addresses)}
 
         def status(request: Request) -> dict[str, Any]:
-            return {**own(request), "exposed": self.config.is_exposed}
+            return {**own_status(request), "exposed": self.config.is_exposed}
 
-        return {**requests, **hands, **calibration, **self.peers.handlers(status)}
+        return {**requests, "hello": hello, **hands, **calibration, **self.peers.handlers(status)}
 
     def replace_shape(self, old: Shape, new: Shape) -> None:
         """Replace a shape in every prop between two ticks. From any thread; raises `RequestError`."""

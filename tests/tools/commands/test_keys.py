@@ -31,6 +31,18 @@ def test_from_nothing_to_a_listed_client(keys):
     assert list(read_allow_list(keys.folder / "clients.allow").values()) == ["stage-pc"]
 
 
+def test_keys_are_replaced_only_by_force_and_the_old_ones_are_revoked(keys):
+    keys("make", "server")
+    keys("make", "stage-pc")
+    before = read_client_keys(keys.folder / "stage-pc.toml").pair.public
+    status, output = keys("make", "stage-pc")
+    assert (status, "already exists; give another name, or --force to replace it" in output) == (1, True)
+    assert keys("make", "stage-pc", "--force")[0] == 0
+    after = read_client_keys(keys.folder / "stage-pc.toml").pair.public
+    assert read_allow_list(keys.folder / "clients.allow") == {after: "stage-pc"}
+    assert after != before
+
+
 @pytest.mark.parametrize(
     ("words", "expected"), [(("make", "../x"), "cannot be the name of a client"), (("make", "a"), "make server")]
 )

@@ -1,10 +1,13 @@
 """`manipnet record` beside a real server, and in the place of one."""
 
 import os
+import socket
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +15,7 @@ import pytest
 from live_server import PATIENCE_S, Sender, Stage, scene
 from tracked_bodies import record_scene
 
+from manipnet.common.options import parse_endpoint
 from manipnet.recording.mcap_file import (
     BODIES,
     HANDS,
@@ -34,13 +38,31 @@ def address(stage: Stage, what: str) -> str:
     return stage.server.addresses[what].removeprefix("tcp://")
 
 
+@contextmanager
+def moving(stage: Stage) -> Iterator[None]:
+    """Hands that move while the block runs."""
+    ended = threading.Event()
+
+    def perform() -> None:
+        while not ended.is_set():
+            stage.perform(0.3, scene)
+
+    thread = threading.Thread(target=perform)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join(PATIENCE_S)
+
+
 def test_every_hands_message_of_a_server_is_recorded(stage: Stage, tmp_path: Path) -> None:
     path = tmp_path / "take.mcap"
     received: dict[int, HandsMessage] = {}
     with RecordingWriter(path, {}) as writer:
         recorder = threading.Thread(
             target=record_hands,
-            args=(address(stage, "hands"), None, None, writer, lambda: writer.counts[HANDS] < 40),
+            args=(parse_endpoint(address(stage, "hands"), 0), None, None, writer, lambda: writer.counts[HANDS] < 40),
         )
         recorder.start()
         while recorder.is_alive():
@@ -61,10 +83,11 @@ def test_a_recording_names_the_model_and_keeps_the_meshes(
     stage: Stage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "take.mcap"
-    server = ["--server", address(stage, "hands"), "--control", address(stage, "control")]
     swapped = stage.server.ask({"op": "select_object", "body": "Box", "object": "mug", "scale": 0.8})
     assert swapped.get("object") == "mug"
-    assert cli.main(["record", "--out", str(path), "--seconds", "0.1", *server]) == 0
+    with moving(stage):
+        server = ["--server", stage.server.addresses["control"]]  # in the form of the ready line
+        assert cli.main(["record", "--out", str(path), "--seconds", "1", *server]) == 0
     assert "hands messages" in capsys.readouterr().err
     about = read_about(path)
     hello = stage.server.ask({"op": "hello"})
@@ -76,6 +99,54 @@ def test_a_recording_names_the_model_and_keeps_the_meshes(
     mug, kept = load_library_mesh("mug", 0.8), recorded_meshes(path)["Box"]
     assert np.allclose(kept.vertices, mug.vertices, atol=1e-6)
     assert np.array_equal(kept.faces, mug.faces)
+
+
+@pytest.fixture
+def nobody() -> str:
+    """The address of a control port at which nothing listens."""
+    with socket.socket() as tcp:
+        tcp.bind(("127.0.0.1", 0))
+        return f"127.0.0.1:{tcp.getsockname()[1]}"
+
+
+@pytest.mark.parametrize("scheme", ["", "tcp://"])
+def test_without_a_server_it_says_so_and_leaves_no_file(
+    scheme: str, nobody: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "take.mcap"
+    assert cli.main(["record", "--out", str(path), "--server", scheme + nobody]) == 1
+    errors = capsys.readouterr().err
+    assert f"no server answers at tcp://{nobody} yet" in errors
+    assert f"no server answers at tcp://{nobody} within 3 s; " in errors
+    assert "--server HOST:PORT" in errors  # a server of another test may run here, and then it is named
+    assert not list(tmp_path.iterdir())
+
+
+def test_when_nothing_arrives_it_says_where_it_listens_and_leaves_no_file(
+    stage: Stage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "take.mcap"
+    assert cli.main(["record", "--out", str(path), "--bodies-port", "0", "--seconds", "1.3"]) == 1
+    errors = capsys.readouterr().err
+    assert "nothing arrives at tcp://127.0.0.1:" in errors
+    assert f"nothing arrived within 1.3 s, so {path} was not written" in errors
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_is_replaced_only_by_force(
+    stage: Stage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "take.mcap"
+    path.write_text("precious")
+    command = ["record", "--out", str(path), "--seconds", "1", "--server", stage.server.addresses["control"]]
+    assert cli.main(command) == 1
+    assert "already exists; give another name, or --force to replace it" in capsys.readouterr().err
+    assert path.read_text() == "precious"
+    with moving(stage):
+        assert cli.main([*command, "--force"]) == 0
+    assert read_about(path).whole
+    assert cli.main(["record", "--out", str(tmp_path / "take.txt")]) == 1
+    assert "must end in .mcap" in capsys.readouterr().err
 
 
 def test_bodies_are_recorded_without_a_server(tmp_path: Path) -> None:
@@ -131,7 +202,7 @@ def test_a_recording_is_replayed_into_a_server(stage: Stage, tmp_path: Path) -> 
     """It is played through the real socket, with another object than at the time of the recording."""
     path = record_scene(tmp_path / "take.mcap", 2.5)
     assert stage.server.ask({"op": "select_object", "body": "Box", "object": "sphere"})["object"] == "sphere"
-    assert cli.main(["replay", str(path), "--to", stage.server.addresses["bodies"]]) == 0
+    assert cli.main(["replay", str(path), "--server", stage.server.addresses["control"]]) == 0
     shown = [stage.subscriber.next()]
     while not 2.4 < shown[-1].t_capture < 10.0:
         shown.append(stage.subscriber.next())

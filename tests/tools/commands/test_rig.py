@@ -7,12 +7,14 @@ import msgpack
 import numpy as np
 import pytest
 import zmq
+from live_server import Stage, scene
 
 from manipnet import cli as server_cli
 from manipnet.common.options import ConfigError
 from manipnet.config.rig_reader import load_rig
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools import cli
+from manipnet_tools.commands.rig import report
 from manipnet_tools.commands.rig_guess import BodyCollector, guess, rig_of
 
 
@@ -78,6 +80,29 @@ def test_the_rig_can_be_read_and_unknown_bodies_stay_as_comments(tmp_path: Path)
     assert '# body = "My \\"Head\\""' in (tmp_path / "rig.toml").read_text(encoding="utf-8")
 
 
+def test_guesses_are_said_with_their_doubt() -> None:
+    found = guess(
+        streamed((1, "LeftHand", 0.0), (2, "RightHand", 0.0), (3, "mug1", 0.0), (4, "Head", 0.0), (9, None, 0.0)), {}
+    )
+    lines = report(found)
+    assert "left_wrist: LeftHand (by its name)" in lines
+    assert any(
+        "prop mug1: the mesh mug of the library, guessed from its name; check its shape" in line for line in lines
+    )
+    assert any("prop Head: no mesh is known" in line for line in lines)
+
+
+def test_init_asks_a_running_server(tmp_path: Path, stage: Stage, capsys) -> None:
+    stage.perform(0.3, scene)
+    path = tmp_path / "rig.toml"
+    assert cli.main(["rig", "init", str(path), "--server", stage.server.addresses["control"]]) == 0
+    assert {part: body.key for part, body in load_rig(path).actors[0].wrists.items()} == {
+        "left_wrist": "left_wrist",
+        "right_wrist": "right_wrist",
+    }
+    assert "prop Box: the mesh cube of the library" in capsys.readouterr().out
+
+
 class Waving:
     """A sender that waves two bodies while the command listens."""
 
@@ -131,7 +156,7 @@ def test_init_listens_and_writes_and_replaces_a_file_only_with_force(tmp_path: P
     }
     before = path.read_text(encoding="utf-8")
     assert cli.main(command) == 1
-    assert "already exists; --force replaces it" in capsys.readouterr().err
+    assert "already exists; give another name, or --force to replace it" in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == before
     wrists = ["--left-wrist", "Anna", "--right-wrist", "4", "--seconds", "0.01", "--force"]
     assert cli.main([*command, *wrists]) == 0

@@ -24,12 +24,15 @@ def ports(monkeypatch):
         for made in (tcp, other, udp):
             made.bind(("127.0.0.1", 0))
         numbers = [made.getsockname()[1] for made in (tcp, udp, other)]
-    names = ("--input-port", "--osc-port", "--control-port")
-    return [f"{name}={number}" for name, number in zip(names, numbers, strict=True)]
+    names = ("--input-port", "--osc-port", "--server")
+    return [
+        f"{name}={'127.0.0.1:' if name == '--server' else ''}{number}"
+        for name, number in zip(names, numbers, strict=True)
+    ]
 
 
 def port(ports, name):
-    return int(next(p for p in ports if p.startswith(name)).partition("=")[2])
+    return int(next(p for p in ports if p.startswith(name)).partition("=")[2].rpartition(":")[2])
 
 
 def test_nothing_arrives(ports, capsys):
@@ -83,17 +86,17 @@ def test_a_server_with_keys_is_asked_with_a_key(ports, capsys, monkeypatch, tmp_
     handlers = {"status": lambda request: {"counters": {"frames_in": {"osc": 5}}, "actors": {}}}
     control = Control(
         "127.0.0.1",
-        port(ports, "--control-port"),
+        port(ports, "--server"),
         Dispatcher(handlers, Telemetry()),
         Telemetry(),
         read_server_keys(tmp_path),
     )
     control.start()
-    assert doctor.main([*ports, f"--key={path}"]) == 0
+    assert doctor.main([*ports, f"--keys={path}"]) == 0
     control.stop()
     assert "frames that arrived: 5 by osc" in capsys.readouterr().out
-    assert doctor.main([*ports, f"--key={tmp_path / 'none.toml'}"]) == 1
-    assert "none.toml does not exist" in capsys.readouterr().out
+    assert doctor.main([*ports, f"--keys={tmp_path / 'none.toml'}"]) == 1
+    assert "none.toml: cannot be read" in capsys.readouterr().out
 
 
 def test_bodies_that_arrive_are_compared_with_the_rig(ports, capsys):

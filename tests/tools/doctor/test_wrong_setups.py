@@ -43,6 +43,11 @@ class Ports:
 
     @property
     def options(self) -> list[str]:
+        return [f"--osc-port={self.osc}", f"--input-port={self.bodies}", f"--server=127.0.0.1:{self.control}"]
+
+    @property
+    def of_server(self) -> list[str]:
+        """The options that make a server use them."""
         return [f"--osc-port={self.osc}", f"--input-port={self.bodies}", f"--control-port={self.control}"]
 
 
@@ -507,7 +512,7 @@ def test_the_running_server_and_the_listening_doctor_agree(name, ports, rig, tin
         doctor.main([*ports.options, f"--rig={rig}", "--seconds=2.5", *options])
         listened = troubles(capsys.readouterr().out.splitlines())
         server: LiveServer = opened.enter_context(
-            serving(f"--rig={rig}", "--model", str(tiny_bundle), *ports.options, *options)
+            serving(f"--rig={rig}", "--model", str(tiny_bundle), *ports.of_server, *options)
         )
         monkeypatch.setattr(examination, "ANSWER_S", 20.0)
         for _ in range(40):
@@ -541,4 +546,4 @@ def test_a_server_with_keys_says_what_is_missing(tiny_bundle, tmp_path, capsys, 
         assert doctor.main([]) == 1
     output = capsys.readouterr().out
     assert "does not answer to strangers, since it was started with --keys" in output
-    assert "→ give --key NAME.toml" in output
+    assert "→ give --keys NAME.toml" in output

@@ -33,7 +33,7 @@ SETTLE_S = 1.0
 QUIET_S = 1.0
 """When no hands arrive for this long after the last body, all have arrived."""
 TOLERANCE_S = 1e-6
-_PORTS = ("port", "input-port", "control-port", "osc-port", "page-port", "web-port")
+_PORTS = ("port", "input-port", "control-port", "osc-port", "page-port", "web-port", "trigger-port")
 
 
 class ServeError(RuntimeError):

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final, Literal, get_args
 
-from tyro.conf import UseAppendAction, arg
-
 from manipnet.common.options import ConfigError
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, Provider
 from manipnet.synthesis.model.shipped import find_bundle
-from manipnet_tools.commands.checks import require_folder_of, require_meshes, require_take
+from manipnet_tools.commands.arguments import UseAppendAction, arg
+from manipnet_tools.commands.checks import require_meshes, require_new, require_take
+from manipnet_tools.commands.options import WritingOptions
 
 Section = Literal[
     "tick", "models", "triangles", "actors", "intake", "straightforward", "start", "live", "cost", "minutes"
@@ -20,7 +20,7 @@ USUAL: Final[tuple[Section, ...]] = tuple(name for name in SECTIONS if name != "
 
 
 @dataclass(frozen=True)
-class BenchOptions:
+class BenchOptions(WritingOptions):
     """Measure how long each stage of a tick takes, beside a reference that is measured in the same run."""
 
     take: Annotated[Path | None, arg(metavar="TAKE", help_behavior_hint="")] = None
@@ -49,4 +49,4 @@ class BenchOptions:
         require_meshes(self.mesh)
         for model in (self.model, *self.beside):
             find_bundle(model)
-        require_folder_of(self.json, "--json")
+        require_new(self.json, self.force, "--json")

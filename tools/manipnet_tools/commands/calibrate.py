@@ -7,7 +7,8 @@ from typing import Any
 from manipnet.common.options import ConfigError
 from manipnet.control.client import ControlClient
 from manipnet_tools.commands.options import CalibrateOptions
-from manipnet_tools.terminal import open_console
+from manipnet_tools.commands.running_server import no_answer, reach
+from manipnet_tools.terminal import WARNING, open_console
 
 ANSWER_S = 10.0
 
@@ -15,7 +16,8 @@ ANSWER_S = 10.0
 def run(options: CalibrateOptions) -> None:
     """Count down, calibrate and print the result. Raises `ConfigError` if the server refuses or does not answer."""
     console = open_console(stderr=False)
-    ask(options, {"op": "ping"})  # a missing server is reported before the countdown, not after it
+    warn = open_console()
+    reach(options.server, options.keys, lambda text: warn.print(text, style=WARNING))  # before the countdown
     for left in range(options.countdown, 0, -1):
         console.print(f"hands on the sheet in {left} …")
         time.sleep(1.0)
@@ -52,8 +54,5 @@ def ask(options: CalibrateOptions, fields: dict[str, Any]) -> dict[str, Any]:
     """Send one request and return the answer. Raises `ConfigError` and `KeyFileError`."""
     try:
         return ControlClient(options.server, options.keys, ANSWER_S).ask(**fields)
-    except TimeoutError as error:
-        raise ConfigError(
-            f"{error}: start it with manipnet-serve --rig FILE, or give the control address in its ready line as "
-            "--server; a server with keys needs --keys FILE"
-        ) from None
+    except TimeoutError:
+        raise ConfigError(no_answer(options.server, options.keys, ANSWER_S)) from None

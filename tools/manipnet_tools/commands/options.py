@@ -8,21 +8,34 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from tyro.conf import Positional, UseAppendAction, arg
-
 from manipnet.common.options import ConfigError
 from manipnet.config.files import require_file
+from manipnet.config.settings import CONTROL_PORT, control_endpoint
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.commands.arguments import Positional, UseAppendAction, arg
 from manipnet_tools.commands.checks import (
-    require_folder_of,
+    already_exists,
     require_look_ahead,
     require_meshes,
-    require_new_file,
+    require_new,
+    require_suffix,
     require_take,
 )
 
 SPEEDS: Final = (0.01, 100.0)
+DEFAULT_SERVER: Final = f"127.0.0.1:{CONTROL_PORT}"
+_GLTF: Final = "export gltf, which Blender opens and saves as {}"
+OTHER_FORMATS: Final = {
+    "fbx": _GLTF.format("FBX"),
+    "usd": _GLTF.format("USD"),
+    "obj": _GLTF.format("OBJ"),
+    "abc": _GLTF.format("Alembic"),
+    "glb": "gltf writes a .glb file",
+    "vrm": "hands of an avatar go with its own file: give --format gltf and --hand HAND.json",
+    "npz": "`manipnet synthesize` writes it",
+}
+"""What to do instead, by a format that is not written here."""
 EXPORT_SUFFIXES: Final = {"gltf": (".glb", ".gltf"), "csv": (".csv",)}
 
 
@@ -31,14 +44,37 @@ def _optional(metavar: str) -> Any:
     return arg(metavar=metavar, help_behavior_hint="")
 
 
+@dataclass(frozen=True, kw_only=True)
+class ServerOptions:
+    """The running server that a verb talks to."""
+
+    server: Annotated[str, arg(metavar="HOST[:PORT]")] = DEFAULT_SERVER
+    """The control port of the server, which tells its other addresses."""
+    keys: Annotated[Path | None, _optional("FILE")] = None
+    """Your key file, for a server that requires keys (`manipnet keys make NAME`)."""
+
+    def check_server(self) -> None:
+        """Raise `ConfigError` for a malformed address or a key file that cannot be opened."""
+        control_endpoint(self.server)
+        require_file(self.keys)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WritingOptions:
+    """A verb that writes files."""
+
+    force: bool = False
+    """Replace what exists already."""
+
+
 @dataclass(frozen=True)
-class ReplayOptions:
-    """Stream a take to a running server."""
+class ReplayOptions(ServerOptions):
+    """Stream a take to a running server, as a tracker would."""
 
     take: Annotated[Positional[Path], arg(metavar="TAKE")]
     """The take: a folder of BVH files, a trajectory text, a Motive CSV or a recording."""
-    to: Annotated[str, arg(metavar="tcp://HOST:PORT|osc://HOST:PORT")]
-    """Where to send it: the server's --input-port over ZeroMQ (tcp://) or its --osc-port (osc://)."""
+    to: Annotated[str | None, _optional("tcp://HOST:PORT|osc://HOST:PORT")] = None
+    """Send it to this address instead of asking the server for its own: ZeroMQ (tcp://) or OSC (osc://)."""
     speed: Annotated[float, arg(metavar="TIMES")] = 1.0
     """Play this many times as fast. The time stamps remain those of the take."""
     loop: bool = False
@@ -50,58 +86,59 @@ class ReplayOptions:
 
     def check(self) -> None:
         require_take(self.take)
+        self.check_server()
         if not SPEEDS[0] <= self.speed <= SPEEDS[1]:
             raise ConfigError(f"--speed is {self.speed:g}; allowed are {SPEEDS[0]:g} to {SPEEDS[1]:g}")
 
 
 @dataclass(frozen=True)
-class RecordOptions:
+class RecordOptions(ServerOptions, WritingOptions):
     """Record until Ctrl-C, or for --seconds.
 
     Beside a running server: its hands and, at 60 Hz, the bodies from which they were synthesised.
 
     Without a server (--bodies-port): the bodies that a tracker sends to this machine, at the tracker's rate.
+
+    If nothing arrives, no file is written and the exit status is 1.
     """
 
     out: Annotated[Path, arg(metavar="FILE")]
-    """The file to write, .mcap; it must not exist."""
-    server: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:5555"
-    """Address of the server's hands."""
+    """The file to write, .mcap."""
     bodies_port: Annotated[int | None, _optional("PORT")] = None
     """Record without a server: listen on this port for senders of bodies over ZeroMQ."""
-    control: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:5557"
-    """Address of the server's control port, which names the model and sends the meshes."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor whose bodies are recorded, if there are several; by default the first one heard."""
     rig: Annotated[Path | None, _optional("FILE")] = None
     """The server's rig file; the recording keeps it and its meshes."""
-    keys: Annotated[Path | None, _optional("FILE")] = None
-    """The client's key file, for a server that requires keys."""
     seconds: Annotated[float | None, _optional("SECONDS")] = None
     """Stop after this time."""
 
     def check(self) -> None:
-        require_new_file(self.out)
+        require_suffix(self.out, ".mcap")
+        require_new(self.out, self.force)
         require_file(self.rig)
-        require_file(self.keys)
+        self.check_server()
 
 
 @dataclass(frozen=True)
-class RecoverOptions:
+class RecoverOptions(WritingOptions):
     """Repair a recording that has no end, for example after a crash or a power cut. The file itself is not changed."""
 
     recording: Annotated[Positional[Path], arg(metavar="RECORDING")]
     """The recording to read."""
     out: Annotated[Path, arg(metavar="FILE")]
-    """The file to write; it must not exist."""
+    """The file to write, .mcap."""
 
     def check(self) -> None:
         require_file(self.recording)
-        require_new_file(self.out)
+        require_suffix(self.out, ".mcap")
+        require_new(self.out, self.force)
+        if self.out.exists() and self.out.samefile(self.recording):
+            raise ConfigError(f"--out {self.out}: is the recording itself, which is not changed; give another name")
 
 
 @dataclass(frozen=True)
-class SynthesizeOptions:
+class SynthesizeOptions(WritingOptions):
     """Write the fingers of both hands of a take to a file, in world coordinates at 60 Hz."""
 
     take: Annotated[Positional[Path], arg(metavar="TAKE")]
@@ -109,7 +146,7 @@ class SynthesizeOptions:
     out: Annotated[Path, arg(metavar="FILE")]
     """The file to write, .npz."""
     mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
-    """An object and its mesh in metres; by default the meshes in the recording, or else those of the rig."""
+    """An object and its mesh, a file in metres or a name of the library; by default the recording's or the rig's."""
     model: Annotated[str, arg(metavar="NAME")] = DEFAULT_MODEL
     """The model: the name of a shipped bundle, or a bundle's folder."""
     look_ahead: Annotated[float, arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
@@ -125,7 +162,8 @@ class SynthesizeOptions:
 
     def check(self) -> None:
         require_take(self.take)
-        require_folder_of(self.out)
+        require_suffix(self.out, ".npz")
+        require_new(self.out, self.force)
         require_meshes(self.mesh)
         find_bundle(self.model)
         require_look_ahead(self.look_ahead)
@@ -146,7 +184,7 @@ class BatchOptions:
     out: Annotated[Path, arg(metavar="DIR")]
     """The folder for the results: one .npz per take, and summary.json."""
     mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
-    """An object and its mesh in metres; by default the meshes in each recording, or else those of the rig."""
+    """An object and its mesh, a file in metres or a name of the library; by default the recording's or the rig's."""
     model: Annotated[str, arg(metavar="NAME")] = DEFAULT_MODEL
     """The model: the name of a shipped bundle, or a bundle's folder."""
     look_ahead: Annotated[float, arg(metavar="SECONDS")] = MAX_LOOK_AHEAD_S
@@ -177,7 +215,7 @@ class BatchOptions:
 
 
 @dataclass(frozen=True)
-class ExportOptions:
+class ExportOptions(WritingOptions):
     """Write hands and objects for other programs.
 
     bvh: a folder with one file per hand and object, the ManipNet dataset's skeleton. gltf: one file with skinned hands,
@@ -186,12 +224,12 @@ class ExportOptions:
 
     source: Annotated[Positional[Path], arg(metavar="RECORDING|NPZ|TAKE")]
     """A recording with hands, a file of `manipnet synthesize`, or a captured take (folder of BVH files)."""
-    format: Literal["bvh", "gltf", "csv"]
+    format: Annotated[Literal["bvh", "gltf", "csv"], arg(instead=OTHER_FORMATS)]
     """The format to write."""
     out: Annotated[Path, arg(metavar="PATH")]
     """The file to write (.glb, .gltf or .csv), or for bvh the folder."""
     mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
-    """gltf: the mesh of an object, in metres, if the source does not hold it."""
+    """gltf: the mesh of an object in metres, a file or an object of the library, if the source does not hold it."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor whose hands to write, if a recording has several; by default the first."""
     hand: Annotated[Path | None, _optional("HAND.json")] = None
@@ -202,25 +240,25 @@ class ExportOptions:
     def check(self) -> None:
         if not self.source.is_dir():
             require_file(self.source)
-        require_folder_of(self.out)
         require_meshes(self.mesh)
         suffixes = EXPORT_SUFFIXES.get(self.format, ())
         if suffixes and self.out.suffix.lower() not in suffixes:
             raise ConfigError(f"--out {self.out}: for --format {self.format} it must end in {' or '.join(suffixes)}")
+        if self.format == "bvh" and any(self.out.glob("*.bvh")) and not self.force:
+            raise ConfigError(already_exists(f"--out {self.out}: a take in BVH files"))
+        require_new(self.out, self.force or self.format == "bvh")
         require_file(self.hand)
         if self.right_handed and self.format != "bvh":
             raise ConfigError(f"--right-handed is for --format bvh only; {self.format} is always right-handed")
 
 
 @dataclass(frozen=True)
-class CalibrateOptions:
+class CalibrateOptions(ServerOptions):
     """Find where the wrists sit on their tracked bodies, and the size of the hands; see docs/calibration.md.
 
     Lay both hands flat on the sheet, wrists on the marks and fingers along the lines, and keep still until it is done.
     """
 
-    server: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:5557"
-    """Address of the server's control port."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor to calibrate, if there are several."""
     hand: Literal["both", "left", "right"] = "both"
@@ -241,8 +279,6 @@ class CalibrateOptions:
     """How long the hands must lie still."""
     dry_run: bool = False
     """Do not change the rig file; the calibration lasts until the server stops."""
-    keys: Annotated[Path | None, _optional("FILE")] = None
-    """The client's key file, for a server that requires keys (`manipnet keys make NAME`)."""
 
     def check(self) -> None:
-        require_file(self.keys)
+        self.check_server()

@@ -5,17 +5,20 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from manipnet import inputs
 from manipnet.common.options import ConfigError, parse_endpoint
 from manipnet.geometry import Array, quat_slerp
-from manipnet.inputs.playback import BodySender, Played, looped, play
+from manipnet.inputs.playback import BodySender, Played, ZmqBodySender, looped, play
+from manipnet.net.curve_keys import read_client_keys
 from manipnet.runtime.signals import stop_on_signals
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.commands.options import ReplayOptions
+from manipnet_tools.commands.running_server import address_of, reach
 from manipnet_tools.takes.take import BodyTrack, Take, TakeError, read_take
-from manipnet_tools.terminal import open_console
+from manipnet_tools.terminal import WARNING, open_console
 
 RATES_HZ = (1.0, 1000.0)
 SHOW_S = 0.2
@@ -27,8 +30,8 @@ def run(options: ReplayOptions) -> None:
     if options.rate is not None:
         take = resample(take, options.rate)
     frames = list(take_frames(take))
-    sender = connect(options.to)
     console = open_console()
+    sender = connect(options.to) if options.to is not None else connect_to_server(options, console)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[state]}"))
     try:
         with Progress(*columns, console=console) as progress, stop_on_signals() as stopping:
@@ -44,6 +47,16 @@ def run(options: ReplayOptions) -> None:
     finally:
         sender.close()
     console.print(f"sent {state(played)}")
+
+
+def connect_to_server(options: ReplayOptions, console: Console) -> BodySender:
+    """The sender to the bodies port of the server that the options name.
+
+    Raises `ConfigError` if no server answers, `KeyFileError` and `PlayError`.
+    """
+    _, hello = reach(options.server, options.keys, lambda text: console.print(text, style=WARNING))
+    host, port = address_of("bodies", hello, options.server)
+    return ZmqBodySender(host, port, keys=None if options.keys is None else read_client_keys(options.keys))
 
 
 def connect(url: str) -> BodySender:

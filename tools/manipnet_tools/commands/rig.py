@@ -1,45 +1,44 @@
 """`manipnet rig`: write a rig file from the bodies that arrive, or show a server's configuration."""
 
 import argparse
-import logging
 import sys
-import threading
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from manipnet import cli
+from manipnet.common.command_line import Parser
 from manipnet.common.options import ConfigError, Option
+from manipnet.config.files import require_file
 from manipnet.config.flags import add_flags, read_flags
-from manipnet.config.rig_reader import parse_rig
-from manipnet.config.rig_writer import replace_file
-from manipnet.config.settings import BodyKey, all_options, input_options, server_config
-from manipnet.inputs import make_receivers, start_receivers
-from manipnet.net.errors import ListenError
-from manipnet.telemetry import Telemetry
-from manipnet_tools.commands.checks import require_folder_of
-from manipnet_tools.commands.rig_guess import BodyCollector, guess, rig_of
+from manipnet.config.settings import BodyKey, all_options, control_endpoint, input_options, server_config
+from manipnet_tools.commands.checks import require_new
 
-EPILOG = """examples:
-  manipnet rig init stage.toml                            listen for 3 s and write stage.toml; wave both hands
-  manipnet rig init stage.toml --natnet 192.168.1.5       listen to OptiTrack Motive too
-  manipnet rig init stage.toml --left-wrist 3 --right-wrist 4
-  manipnet rig show --rig stage.toml --look-ahead 0.1     show the configuration that manipnet-serve would use"""
+if TYPE_CHECKING:
+    from manipnet_tools.commands.rig_guess import Guess, StreamedBody
+
+EXAMPLES = (
+    "init stage.toml                            listen for 3 s and write stage.toml; wave both hands",
+    "init stage.toml --natnet 192.168.1.5       listen to OptiTrack Motive too",
+    "init stage.toml --server 127.0.0.1         the bodies that a running server receives",
+    "init stage.toml --left-wrist 3 --right-wrist 4",
+    "show --rig stage.toml --look-ahead 0.1     show the configuration that manipnet-serve would use",
+)
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> Parser:
     """The options of `manipnet rig`."""
-    parser = argparse.ArgumentParser(
-        prog="manipnet rig",
-        description="Write a rig file from the bodies that arrive, or show the configuration of a server.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    parser = Parser(
+        "manipnet rig",
+        "Write a rig file from the bodies that arrive, or show the configuration of a server.",
+        EXAMPLES,
     )
-    verbs = parser.add_subparsers(dest="verb", required=True)
-    init = verbs.add_parser("init", usage="manipnet rig init FILE [options]", help="listen, then write a rig file")
+    verbs = parser.add_subparsers(dest="verb", required=True, parser_class=Parser, prog="manipnet rig")
+    init = verbs.add_parser("init", help="listen, then write a rig file", description="Listen, then write a rig file.")
     init.add_argument("file", type=Path, metavar="FILE", help="the rig file to write")
     init.add_argument("--force", action="store_true", help="replace a file that exists, and keep it as FILE.bak")
+    init.add_argument("--server", metavar="HOST[:PORT]", help="take the bodies that this running server receives")
+    init.add_argument("--keys", type=Path, metavar="FILE", help="your key file, for a server that requires keys")
     init.add_argument("--seconds", type=float, default=3.0, help="how long to listen (default: %(default)s)")
     for side in ("left", "right"):
         init.add_argument(
@@ -63,29 +62,76 @@ def main(argv: Sequence[str] | None = None) -> int:
 def init(options: argparse.Namespace) -> None:
     """Listen and write the rig file. Raises `ConfigError`, and then no file has changed."""
     path: Path = options.file
-    if path.exists() and not options.force:
-        raise ConfigError(f"{path} already exists; --force replaces it, and keeps it as {path.name}.bak")
-    require_folder_of(path, "the rig file")
+    require_new(path, options.force, "the rig file")
+    require_file(options.keys)
     given = {"left_wrist": options.left_wrist, "right_wrist": options.right_wrist}
     wrists = {part: _key(text) for part, text in given.items() if text is not None}
     values = read_flags(options, _server_options())
-    collector = _listen(values, options.seconds)
-    bodies = list(collector.bodies.values())
+    if options.server is not None:
+        control_endpoint(options.server)
+    from manipnet.config.rig_reader import parse_rig
+    from manipnet.config.rig_writer import replace_file
+    from manipnet_tools.commands.rig_guess import guess, rig_of
+
+    bodies = _streamed(options, values)
     if not bodies and not wrists:
-        raise ConfigError(f"nothing arrived within {options.seconds:g} s; `manipnet doctor` says why")
+        where = f"the server at {options.server} has received no body" if options.server else "nothing arrived"
+        raise ConfigError(f"{where} within {options.seconds:g} s; `manipnet doctor` says why")
     found = guess(bodies, wrists)
     text = rig_of(found, _to_write(values))
     parse_rig(text, path.parent, str(path))
     replaced = path.exists()
     backup = replace_file(path, text)
-    for part, (key, reason) in found.wrists.items():
-        print(f"{part}: {key} ({reason})")
-    print("other bodies: " + (", ".join(str(body.key) for body in found.others) or "none"))
+    print("\n".join(report(found)))
     print(f"wrote {path}" + (f"; the file it replaces is now {backup}" if replaced else ""))
 
 
-def _listen(values: dict[str, Any], seconds: float) -> BodyCollector:
+def report(found: "Guess") -> list[str]:
+    """What was guessed of each body, why, and what to check."""
+    from manipnet_tools.commands.rig_guess import likely_mesh
+
+    lines = [f"{part}: {key} ({reason})" for part, (key, reason) in found.wrists.items()]
+    for body in found.others:
+        mesh = likely_mesh(body.name)
+        if mesh is None:
+            lines.append(f"prop {body.key}: no mesh is known, so it is a comment in the file; give it its mesh")
+        else:
+            lines.append(
+                f"prop {body.key}: the mesh {mesh} of the library, guessed from its name; "
+                "check its shape, size and place, because they decide the grasp"
+            )
+    return lines
+
+
+def _streamed(options: argparse.Namespace, values: dict[str, Any]) -> "list[StreamedBody]":
+    """The bodies that a running server receives, or that arrive here within some seconds. Raises `ConfigError`."""
+    from manipnet_tools.terminal import WARNING, countdown, open_console
+
+    if options.server is None:
+        with countdown("wave both hands, the right hand more", options.seconds):
+            return _listen(values, options.seconds)
+    from manipnet_tools.commands.rig_guess import StreamedBody
+    from manipnet_tools.commands.running_server import reach
+
+    console = open_console()
+    client, _ = reach(options.server, options.keys, lambda text: console.print(text, style=WARNING))
+    senders: Mapping[str, Any] = client.ask("status")["senders"]
+    keys = dict.fromkeys((body["id"], body["name"]) for sender in senders.values() for body in sender["bodies"])
+    return [StreamedBody(id, name) for id, name in keys]
+
+
+def _listen(values: dict[str, Any], seconds: float) -> "list[StreamedBody]":
     """Collect the bodies that arrive within some seconds. Raises `ConfigError` if a receiver cannot listen."""
+    import logging
+    import threading
+    from contextlib import ExitStack
+
+    from manipnet.inputs import make_receivers, start_receivers
+    from manipnet.net.errors import ListenError
+    from manipnet.runtime.run_file import running_servers
+    from manipnet.telemetry import Telemetry
+    from manipnet_tools.commands.rig_guess import BodyCollector
+
     collector = BodyCollector()
     config = server_config((), values)
     receivers = make_receivers(config.of, collector, Telemetry(), config.host)
@@ -96,12 +142,14 @@ def _listen(values: dict[str, Any], seconds: float) -> BodyCollector:
         try:
             start_receivers(receivers, opened)
         except ListenError as error:
-            raise ConfigError(f"{error} (if a server runs on this machine, stop it first)") from None
+            controls = [each.addresses["control"] for each in running_servers() if "control" in each.addresses]
+            remedy = f"; a server runs here and can say what it receives: --server {controls[0]}" if controls else ""
+            raise ConfigError(f"{error}{remedy}") from None
         for receiver in receivers.values():
-            print(f"listening on {receiver.address}", flush=True)
-        print(f"wave both hands for {seconds:g} s, the right hand more …", flush=True)
+            print(f"listening on {receiver.address}")
+        sys.stdout.flush()
         threading.Event().wait(seconds)
-    return collector
+    return list(collector.bodies.values())
 
 
 def _key(text: str) -> BodyKey:

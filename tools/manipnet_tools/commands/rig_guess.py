@@ -105,7 +105,7 @@ def rig_of(found: Guess, server: Mapping[str, object]) -> str:
     lines = ["# Written by `manipnet rig init`; see docs/rig.md.", "[bodies]"]
     lines += [f"{part} = {_toml(key)}   # {reason}" for part, (key, reason) in found.wrists.items()]
     for body in found.others:
-        mesh = _mesh(body.name)
+        mesh = likely_mesh(body.name)
         lines += [
             "",
             *(_object(body, mesh) if mesh else [f"# {line}" for line in _object(body, "your own mesh.obj")]),
@@ -119,7 +119,9 @@ def _object(body: StreamedBody, mesh: str) -> list[str]:
     return [
         "[[objects]]",
         f"body = {_toml(body.key)}",
-        f"mesh = {_toml(mesh)}   # a file in this folder, or the name of a library object",
+        f"mesh = {_toml(mesh)}   # guessed: a file in this folder, or the name of a library object"
+        if mesh in library_names()
+        else f"mesh = {_toml(mesh)}   # a file in this folder, or the name of a library object",
     ]
 
 
@@ -133,7 +135,8 @@ def _is_named(name: str | None, part: str) -> bool:
     return bool(side and words & _HANDS) or (words in ({"left"}, {"right"}) and bool(side))
 
 
-def _mesh(name: str | None) -> str | None:
+def likely_mesh(name: str | None) -> str | None:
+    """The object of the library that a body's name suggests, or None."""
     words = _words(name)
     joined = "_".join(words)
     known = [mesh for mesh in library_names() if mesh in joined or mesh in words]

@@ -7,7 +7,8 @@ from typing import Final, Literal
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER, solver_named
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
 from manipnet.synthesis.model.shipped import find_bundle
-from manipnet_tools.commands.checks import require_folder_of
+from manipnet_tools.commands.checks import require_new
+from manipnet_tools.commands.options import WritingOptions
 from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.training.config import TrainConfig
 
@@ -28,7 +29,7 @@ ABLATION_TRAINING: Final = TrainConfig(
 
 
 @dataclass(frozen=True)
-class EvaluateOptions:
+class EvaluateOptions(WritingOptions):
     """Evaluate models on the dataset's takes: print tables and, on request, write JSON and plots."""
 
     data: Path
@@ -67,7 +68,8 @@ class EvaluateOptions:
         if self.protocol == "seen":
             for model in self.model:
                 find_bundle(model)
-        require_folder_of(self.json, "--json")
+        require_new(self.json, self.force, "--json")
+        require_new(self.sheet, self.force, "--sheet")
 
 
 @dataclass(frozen=True)

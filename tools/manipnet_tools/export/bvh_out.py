@@ -16,14 +16,14 @@ _CHANNELS = "Yrotation Xrotation Zrotation"
 _ROOT_CHANNELS = f"CHANNELS 6 Xposition Yposition Zposition {_CHANNELS}"
 
 
-def write_bvh(animation: Animation, folder: Path, right_handed: bool = False) -> list[Path]:
+def write_bvh(animation: Animation, folder: Path, right_handed: bool = False, replace: bool = False) -> list[Path]:
     """Write `leftHand.bvh`, `rightHand.bvh` and `<object>.bvh` into `folder`; returns the files.
 
     By default the files are left-handed and in decimetres, like the dataset's, and every tool here reads them. With
     `right_handed` they are in centimetres, as Blender and Maya expect; no tool here reads those. Raises `ExportError`
-    if the folder already contains BVH files.
+    if the folder already contains BVH files, unless they are to be replaced.
     """
-    if any(folder.glob("*.bvh")):
+    if not replace and any(folder.glob("*.bvh")):
         raise ExportError(f"{folder}: already contains BVH files, which may be a take; give a new folder")
     folder.mkdir(parents=True, exist_ok=True)
     space = _Space(CENTIMETRES_PER_M, False) if right_handed else _Space(1.0 / DECIMETRE_M, True)

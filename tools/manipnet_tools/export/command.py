@@ -30,7 +30,7 @@ def run(options: ExportOptions) -> None:
             animation = carry_animation(animation, read_profile(options.hand))
     with console.status(f"writing {options.out}"):
         if options.format == "bvh":
-            write_bvh(animation, options.out, options.right_handed)
+            write_bvh(animation, options.out, options.right_handed, options.force)
         elif options.format == "gltf":
             write_gltf(animation, options.out)
         else:

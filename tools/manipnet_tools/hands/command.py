@@ -6,42 +6,48 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from manipnet.common.command_line import Parser
 from manipnet.config.files import require_file
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
-from manipnet_tools.commands.checks import require_take
+from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.commands.checks import require_meshes, require_new, require_take
 
-EPILOG = """examples:
-  manipnet hand import avatar.vrm --out hand.json            make a profile, and hand.png that shows it
-  manipnet hand import avatar.glb --map bones.json --out hand.json
-  manipnet hand show hand.json --out hand.png
-  manipnet hand check hand.json takes/mug1 --mesh mug1=mug1.obj
-A map is a JSON file {"left": {"wrist": "Hand_L", "index_proximal": "Finger1_L", …}, "right": {…}}."""
+EXAMPLES = (
+    "import avatar.vrm --out hand.json            make a profile, and hand.png that shows it",
+    "import avatar.glb --map bones.json --out hand.json",
+    "show hand.json --out hand.png",
+    "check hand.json takes/mug1 --mesh mug1=mug1.obj",
+)
+FORCE = "replace what exists already"
+MAP = 'A map is a JSON file {"left": {"wrist": "Hand_L", "index_proximal": "Finger1_L", …}, "right": {…}}.'
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Do what the arguments say. Returns the exit status; raises `ValueError`s of the package for a wrong file."""
-    options = _parser().parse_args(argv)
+    options = build_parser().parse_args(argv)
     options.do(options)
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="manipnet hand",
-        description="Make, draw and check the profile of an avatar's hand, on which the server then solves contact.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+def build_parser() -> Parser:
+    """The options of `manipnet hand`."""
+    parser = Parser(
+        "manipnet hand",
+        f"Make, draw and check the profile of an avatar's hand, on which the server then solves contact.\n{MAP}",
+        EXAMPLES,
     )
-    verbs = parser.add_subparsers(dest="verb", required=True)
+    verbs = parser.add_subparsers(dest="verb", required=True, parser_class=Parser, prog="manipnet hand")
     take_in = verbs.add_parser("import", help="make a profile from the rig of an avatar")
     take_in.add_argument("avatar", type=Path, metavar="AVATAR", help="the avatar: .glb, .vrm or .bvh")
     take_in.add_argument("--map", type=Path, metavar="FILE", help="JSON file that says which bone is which joint")
     take_in.add_argument("--name", help="name of the profile (default: that of the avatar's file)")
     take_in.add_argument("--out", type=Path, required=True, metavar="HAND.json", help="the file to write")
+    take_in.add_argument("--force", action="store_true", help=FORCE)
     take_in.set_defaults(do=_import)
     show = verbs.add_parser("show", help="draw a profile")
     show.add_argument("hand", type=Path, metavar="HAND.json")
     show.add_argument("--out", type=Path, required=True, metavar="FILE.png", help="the picture to write")
+    show.add_argument("--force", action="store_true", help=FORCE)
     show.set_defaults(do=_show)
     check = verbs.add_parser("check", help="measure on a take how much contact survives on the hand")
     check.add_argument("hand", type=Path, metavar="HAND.json")
@@ -55,6 +61,10 @@ def _parser() -> argparse.ArgumentParser:
 
 def _import(options: argparse.Namespace) -> None:
     require_file(options.avatar)
+    require_file(options.map)
+    picture = options.out.with_suffix(".png")
+    for file in (options.out, picture):
+        require_new(file, options.force)
     from manipnet.synthesis.hand.profile import profile_to_json
     from manipnet.synthesis.model.shipped import shipped_hand
     from manipnet_tools.hands.importing import import_profile
@@ -63,15 +73,16 @@ def _import(options: argparse.Namespace) -> None:
     profile = import_profile(options.avatar, name, shipped_hand(), print, options.map)
     options.out.write_text(profile_to_json(profile), encoding="utf-8")
     print(f"wrote {options.out}")
-    _draw(options.out, options.out.with_suffix(".png"))
+    _draw(options.out, picture)
 
 
 def _show(options: argparse.Namespace) -> None:
+    require_file(options.hand)
+    require_new(options.out, options.force)
     _draw(options.hand, options.out)
 
 
 def _draw(hand: Path, out: Path) -> None:
-    require_file(hand)
     from manipnet.synthesis.hand.profile import read_profile
     from manipnet.synthesis.model.bundle import load_bundle
     from manipnet_tools.hands.drawing import draw_profile
@@ -85,6 +96,8 @@ def _draw(hand: Path, out: Path) -> None:
 def _check(options: argparse.Namespace) -> None:
     require_file(options.hand)
     require_take(options.take)
+    require_meshes(options.mesh)
+    find_bundle(options.model)
     from manipnet.synthesis.hand.profile import read_profile
     from manipnet_tools.hands.check import check_profile
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import Positional, UseAppendAction, arg
-
+from manipnet_tools.commands.arguments import Positional, UseAppendAction, arg
 from manipnet_tools.commands.checks import require_meshes
 
 

@@ -3,15 +3,16 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tyro.conf import Positional
-
 from manipnet.synthesis.model.shipped import find_bundle
+from manipnet_tools.commands.arguments import Positional
+from manipnet_tools.commands.checks import require_new_bundle
+from manipnet_tools.commands.options import WritingOptions
 from manipnet_tools.takes.dataset import DataError, take_folders
 from manipnet_tools.training.config import TrainConfig
 
 
 @dataclass(frozen=True)
-class TrainOptions:
+class TrainOptions(WritingOptions):
     """Train a model on the published takes."""
 
     data: Path
@@ -25,7 +26,8 @@ class TrainOptions:
     training: TrainConfig = field(default_factory=TrainConfig)
 
     def check(self) -> None:
-        """Raise `DataError` unless there are takes to train on."""
+        """Raise `DataError` unless there are takes to train on, and `ConfigError` for a bundle that exists already."""
+        require_new_bundle(self.out, self.force)
         self.takes()
 
     def takes(self) -> list[str]:
@@ -39,7 +41,7 @@ class TrainOptions:
 
 
 @dataclass(frozen=True)
-class QuantiseOptions:
+class QuantiseOptions(WritingOptions):
     """Write a copy of a bundle with 8-bit weights, or 4-bit ones in wide layers: smaller, and faster if it is wide."""
 
     model: Positional[str]
@@ -48,5 +50,6 @@ class QuantiseOptions:
     """Folder of the bundle to write."""
 
     def check(self) -> None:
-        """Raise `BundleError` for a bundle that does not exist."""
+        """Raise `BundleError` for a bundle that does not exist, and `ConfigError` for one that would be replaced."""
+        require_new_bundle(self.out, self.force)
         find_bundle(self.model)

@@ -39,7 +39,7 @@ def _open(options: OscOptions, reception: Reception) -> Receiver:
     from manipnet.inputs.osc.receiver import OscBodies
 
     book = AddressBook(options.osc_address, options.bridge_axes, reception.bodies)
-    return OscBodies(reception.intake, reception.host, options.osc_port, reception.allow, book)
+    return OscBodies(reception.intake, reception.host, options.osc_port, reception.allow, book, reception.record)
 
 
 def _player(host: str, port: int) -> "BodySender":

@@ -3,22 +3,24 @@
 import logging
 import socket
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from manipnet.common.log_limits import LogThrottle
 from manipnet.common.options import Network
 from manipnet.inputs.base import Intake
 from manipnet.inputs.declaration import Receiver
 from manipnet.inputs.osc.addresses import AddressBook
 from manipnet.inputs.osc.assembler import GAP_S, FrameAssembler
-from manipnet.inputs.osc.packet import split_packet
+from manipnet.inputs.osc.packet import Packet, split_packet
+from manipnet.inputs.osc.triggers import take_triggers
 from manipnet.net.addresses import AllowList
 from manipnet.net.flood_filter import FloodFilter, FloodWatch
 from manipnet.net.rate_limit import SourceRateLimiter
 from manipnet.net.supervised import ReceiverHealth
 from manipnet.net.udp import Address, UdpThread, bind_udp
-from manipnet.telemetry import LogThrottle
 from manipnet.wire.bodies import BodyFrame, MessageError
+from manipnet.wire.record_trigger import RecordTrigger
 
 MAX_SENDERS = 16
 DATAGRAMS_PER_S = 20_000
@@ -45,8 +47,10 @@ class OscBodies(Receiver):
         port: int = 39540,
         allow: Sequence[Network] = (),
         book: AddressBook | None = None,
+        record: Callable[[RecordTrigger], object] | None = None,
     ) -> None:
-        self._intake = intake
+        """`record` takes the triggers of recordings; without it, they are not understood."""
+        self._intake, self._record = intake, record
         self._book = book or AddressBook()
         self._log_throttle = LogThrottle(REPEAT_S)
         self._rate_limiter = SourceRateLimiter(DATAGRAMS_PER_S)
@@ -110,7 +114,7 @@ class OscBodies(Receiver):
         assembler = self._assemblers.get(sender) or FrameAssembler(f"osc:{_name(sender)}", self._book)
         before = assembler.incomplete
         try:
-            frames, useful, faults = assembler.add(split_packet(datagram), now_s)
+            frames, useful, faults = assembler.add(self._without_triggers(split_packet(datagram), sender), now_s)
         except MessageError as error:
             frames, useful, faults = [], False, [str(error)]
         if useful:
@@ -121,6 +125,14 @@ class OscBodies(Receiver):
         if faults:
             self._intake.drop("malformed", assembler.source, faults[0], len(faults))
         self._pass_on(assembler, frames, before)
+
+    def _without_triggers(self, packet: Packet, sender: Address) -> Packet:
+        if self._record is None:
+            return packet
+        packet, triggers = take_triggers(packet, f"osc:{_name(sender)}")
+        for trigger in triggers:
+            self._record(trigger)
+        return packet
 
     def _remember(self, sender: Address, assembler: FrameAssembler) -> None:
         self._assemblers.pop(sender, None)

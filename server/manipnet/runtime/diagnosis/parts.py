@@ -35,7 +35,8 @@ def _of_part(part: str, health: Mapping[str, Any], report: Report) -> Finding:
     share = body["tracked"]
     if not share:
         remedy = "it is occluded, outside of the volume or switched off: check its state in the tracking software"
-        return Finding("problem", f"{part}: body {key!r} arrives but is never tracked ({source})", remedy)
+        text = f"{part}: body {key!r} arrives but is never tracked ({body['rate_hz']:.0f} frames per second"
+        return Finding("problem", f"{text} from {source}, the newest {ago(body['age_s'])})", remedy)
     text = (
         f"{part}: body {key!r} is tracked in {100 * share:.0f} % of {body['rate_hz']:.0f} frames per second from "
         f"{source}, the newest {ago(body['age_s'])}"
@@ -50,7 +51,8 @@ def _missing(part: str, key: object, arrived: Mapping[str, Mapping[str, Any]], r
     if arrived:
         source, body = min(arrived.items(), key=lambda item: item[1]["age_s"])
         remedy = "it is switched off or no longer streamed, or its sender has stopped"
-        return Finding("problem", f"{part}: body {key!r} last arrived {ago(body['age_s'])} from {source}", remedy)
+        text = f"{part}: nothing of body {key!r} for {body['age_s']:.0f} s; the last came from {source}"
+        return Finding("problem", text, remedy)
     if reason := _refused(key, report):
         return Finding("problem", f"{part}: body {key!r} is refused: {reason}", "rename it, or give it another id")
     others = sorted({label(body) for _, body in _fresh(report)})

@@ -3,13 +3,17 @@
 Finding a bundle imports neither NumPy nor ONNX Runtime, so that a command can name a wrong one at once.
 """
 
+import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
 
 if TYPE_CHECKING:
     from manipnet.synthesis.hand.hand import Hand
+
+
+NO_LICENCE: Final = "not stated"
 
 
 class BundleError(ValueError):
@@ -26,6 +30,24 @@ def models_folder() -> Path:
 def shipped_models() -> list[str]:
     """Names of the shipped bundles."""
     return sorted(path.name for path in models_folder().glob("*") if (path / "bundle.json").is_file())
+
+
+def licence_of(folder: Path) -> str:
+    """The licence that a bundle states. Raises `BundleError` if its description cannot be read."""
+    file = folder / "bundle.json"
+    try:
+        return str(json.loads(file.read_text(encoding="utf-8")).get("licence") or NO_LICENCE)
+    except (OSError, ValueError, AttributeError) as error:
+        raise BundleError(f"{file}: cannot be read ({error})") from None
+
+
+def version_text(program: str, version: str) -> str:
+    """What `--version` prints: the version, and the licence of the code and of each shipped model."""
+    licences: dict[str, list[str]] = {}
+    for name in shipped_models():
+        licences.setdefault(licence_of(models_folder() / name), []).append(name)
+    models = [f"models {', '.join(names)}: {licence}" for licence, names in licences.items()]
+    return "\n".join([f"{program} {version}", "code: Apache-2.0", *models])
 
 
 def find_bundle(model: Path | str) -> Path:
