@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal
 from tyro.conf import Positional, UseAppendAction, arg
 
 from manipnet.common.options import ConfigError
-from manipnet.config.files import require_file
+from manipnet.config.files import require_file, require_hand
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.model.shipped import find_bundle
 from manipnet_tools.commands.checks import (
@@ -119,7 +119,7 @@ class SynthesizeOptions:
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
     hand: Annotated[Path | None, _optional("HAND.json")] = None
-    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
+    """Also write the hands of this avatar, or of a shipped one (generic, adult, child); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
 
@@ -130,7 +130,7 @@ class SynthesizeOptions:
         find_bundle(self.model)
         require_look_ahead(self.look_ahead)
         require_file(self.rig)
-        require_file(self.hand)
+        require_hand(self.hand)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class BatchOptions:
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
     hand: Annotated[Path | None, _optional("HAND.json")] = None
-    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
+    """Also write the hands of this avatar, or of a shipped one (generic, adult, child); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
     jobs: Annotated[int | None, _optional("N")] = None
@@ -171,7 +171,7 @@ class BatchOptions:
         find_bundle(self.model)
         require_look_ahead(self.look_ahead)
         require_file(self.rig)
-        require_file(self.hand)
+        require_hand(self.hand)
         if self.jobs is not None and self.jobs < 1:
             raise ConfigError(f"--jobs is {self.jobs}; it must be at least 1")
 
@@ -207,7 +207,7 @@ class ExportOptions:
         suffixes = EXPORT_SUFFIXES.get(self.format, ())
         if suffixes and self.out.suffix.lower() not in suffixes:
             raise ConfigError(f"--out {self.out}: for --format {self.format} it must end in {' or '.join(suffixes)}")
-        require_file(self.hand)
+        require_hand(self.hand)
         if self.right_handed and self.format != "bvh":
             raise ConfigError(f"--right-handed is for --format bvh only; {self.format} is always right-handed")
 

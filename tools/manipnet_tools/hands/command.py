@@ -6,14 +6,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from manipnet.config.files import require_file
+from manipnet.config.files import require_file, require_hand
+from manipnet.synthesis.hand.shipped_files import NAMES
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
 from manipnet_tools.commands.checks import require_take
 
+_HAND = "a profile, or a shipped hand: " + ", ".join(NAMES)
 EPILOG = """examples:
   manipnet hand import avatar.vrm --out hand.json            make a profile, and hand.png that shows it
   manipnet hand import avatar.glb --map bones.json --out hand.json
-  manipnet hand show hand.json --out hand.png
+  manipnet hand show adult --out adult.png                    draw a hand that is shipped
   manipnet hand check hand.json takes/mug1 --mesh mug1=mug1.obj
 A map is a JSON file {"left": {"wrist": "Hand_L", "index_proximal": "Finger1_L", …}, "right": {…}}."""
 
@@ -40,11 +42,11 @@ def _parser() -> argparse.ArgumentParser:
     take_in.add_argument("--out", type=Path, required=True, metavar="HAND.json", help="the file to write")
     take_in.set_defaults(do=_import)
     show = verbs.add_parser("show", help="draw a profile")
-    show.add_argument("hand", type=Path, metavar="HAND.json")
+    show.add_argument("hand", type=Path, metavar="HAND", help=_HAND)
     show.add_argument("--out", type=Path, required=True, metavar="FILE.png", help="the picture to write")
     show.set_defaults(do=_show)
     check = verbs.add_parser("check", help="measure on a take how much contact survives on the hand")
-    check.add_argument("hand", type=Path, metavar="HAND.json")
+    check.add_argument("hand", type=Path, metavar="HAND", help=_HAND)
     check.add_argument("take", type=Path, metavar="TAKE", help="the take, as for `manipnet synthesize`")
     check.add_argument("--mesh", action="append", default=[], metavar="NAME=FILE", help="an object and its mesh")
     check.add_argument("--model", default=DEFAULT_MODEL, metavar="NAME", help="the model (default: %(default)s)")
@@ -71,7 +73,7 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _draw(hand: Path, out: Path) -> None:
-    require_file(hand)
+    require_hand(hand)
     from manipnet.synthesis.hand.profile import read_profile
     from manipnet.synthesis.model.bundle import load_bundle
     from manipnet_tools.hands.drawing import draw_profile
@@ -83,7 +85,7 @@ def _draw(hand: Path, out: Path) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    require_file(options.hand)
+    require_hand(options.hand)
     require_take(options.take)
     from manipnet.synthesis.hand.profile import read_profile
     from manipnet_tools.hands.check import check_profile
