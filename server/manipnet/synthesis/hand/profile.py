@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manipnet.geometry import SIDES, Array, Side, compose, invert, mirror_poses
+from manipnet.synthesis.hand.shipped_files import hand_file
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 MAX_NAME_BYTES: Final = 63
@@ -58,7 +59,8 @@ class HandProfile:
 
 
 def read_profile(path: Path) -> HandProfile:
-    """Read a profile from a JSON file. Raises `ProfileError`, whose text names the file."""
+    """Read a profile from a JSON file, or the shipped one of that name. Raises `ProfileError`, which names the file."""
+    path = hand_file(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
