@@ -84,8 +84,12 @@ class LiveClient:
     @classmethod
     def start(cls, command: list[str], address: str, verb: str = "live") -> "LiveClient":
         """Start the harness with `live` or `idle`."""
+        return cls.run([*command, verb, address])
+
+    @classmethod
+    def run(cls, words: list[str]) -> "LiveClient":
+        """Start the harness with these words."""
         pipe, environment = subprocess.PIPE, {**os.environ, **SMALL_NURSERY}
-        words = [*command, verb, address]
         return cls(subprocess.Popen(words, stdin=pipe, stdout=pipe, encoding="utf-8", env=environment))
 
     def ask(self, what: str = "") -> Any:
