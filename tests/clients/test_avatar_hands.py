@@ -150,6 +150,23 @@ def shown_when(client, ready):
     return shown
 
 
+def is_a_hand(joints, rest, unit):
+    """Whether the bones in a message have the lengths of the rig's.
+
+    What a client shows is a mean of frames. It is not exactly a hand where the hand jumps from one frame to the next, as
+    that of the tests' small model sometimes does.
+    """
+    places = np.array(joints).reshape(26, 7)[:, :3]
+    for bone, place in rest.positions.items():
+        joint = 2 + bone if bone < 3 else 2 + 5 * (bone // 3) + bone % 3
+        later = [k for k in rest.bones if bone < k < 3 * (bone // 3) + 3]
+        after = joint + later[0] - bone if later else 5 + 5 * (bone // 3)
+        length = unit * np.linalg.norm(rest.end_of(bone) - place)
+        if abs(np.linalg.norm(places[after] - places[joint]) - length) > 1e-4:
+            return False
+    return True
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_fingertips_are_where_the_message_says(harness, language, stage, performance, kind):
     to_engine, unit = ENGINES[language]
@@ -158,7 +175,7 @@ def test_fingertips_are_where_the_message_says(harness, language, stage, perform
     try:
         shown_when(client, lambda s: s["received"] > 30 and s["weight"] == 1 and "left" in s and "right" in s)
         for _ in range(10):
-            shown = client.ask()
+            shown = shown_when(client, lambda s: all(is_a_hand(s[side]["joints"], hands[side], unit) for side in SIDES))
             for side, rest in hands.items():
                 hand = {key: np.array(value) for key, value in shown[side].items()}
                 joints = np.array([to_engine(joint) for joint in hand["joints"].reshape(26, 7)])
@@ -170,10 +187,47 @@ def test_fingertips_are_where_the_message_says(harness, language, stage, perform
                     finger, part = (k // 3, k % 3) if k < 15 else (k - 15, 3)
                     joint = 2 + part if finger == 0 else 2 + 5 * finger + part
                     assert unit * np.linalg.norm(place - joints[joint, :3]) < TIP_M, (side, k)
-                assert len(placed) >= 10
+                assert len(placed) == len(rest.bones) + (3 if kind == "cartoon" else 5)
             time.sleep(0.05)
     finally:
         client.kill()
+
+
+@pytest.mark.parametrize(("kind", "scale"), [("mixamo", 0.01), ("cartoon", 1.0), ("metahuman", 1.0)])
+def test_unity_components_put_the_fingertips_where_the_message_says(harness, stage, performance, kind, scale):
+    rig = avatar_rig(kind, seed=2)
+    poses = [to_unity(np.hstack(pose)) for pose in zip(rig.positions, rig.rotations, strict=True)]
+    lines = [f"{scale} {len(poses)}"]
+    for name, parent, pose in zip(rig.names, rig.parents, poses, strict=True):
+        lines.append("\t".join([name, str(parent), *(repr(float(x)) for x in pose)]))
+    addresses = stage.server.addresses
+    client = LiveClient.run([*harness("unity"), addresses["hands"], addresses["control"]])
+    assert client.process.stdin is not None
+    client.process.stdin.write("\n".join(lines) + "\n")
+    try:
+        hands = {side: rest_of(rig, kind, side, to_unity) for side in SIDES}
+        shown = shown_when(
+            client,
+            lambda s: s["solved"] and s["weight"] == 1 and all(is_a_hand(s[k], hands[k], 1.0) for k in SIDES),
+        )
+        assert f"Stream: {rig.names[0]}_" in shown["drawn"]
+        assert "State: connected" in shown["drawn"]
+        places = np.array(shown["bones"]).reshape(-1, 3)
+        for side in SIDES:
+            joints = np.array([to_unity(joint) for joint in np.array(shown[side]).reshape(26, 7)])
+            rest = hands[side]
+            for bone, k in rest.bones.items():
+                joint = 2 + bone if bone < 3 else 2 + 5 * (bone // 3) + bone % 3
+                assert np.linalg.norm(places[k] - joints[joint, :3]) < TIP_M, rig.names[k]
+            for finger in rest.tips:
+                name = max(n for n, above in enumerate(rig.parents) if above == rest.bones[last_bone(rest, finger)])
+                assert np.linalg.norm(places[name] - joints[5 + 5 * finger, :3]) < TIP_M, rig.names[name]
+    finally:
+        client.kill()
+
+
+def last_bone(rest, finger):
+    return max(bone for bone in rest.bones if bone // 3 == finger)
 
 
 def test_a_refusal_of_the_server_is_shown(harness, language, stage, performance):

@@ -14,6 +14,7 @@ from manipnet.geometry import SIDES, Array, Side, quat_conjugate, quat_exp, quat
 from manipnet.synthesis.hand.avatar import model_profile
 from manipnet.synthesis.hand.profile import FINGERS
 from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet_tools.hands.importing import TIP_SHARE
 
 WORDS: Final = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 KINDS: Final = ("mixamo", "manny", "metahuman", "cartoon", "vrm1", "motive")
@@ -130,10 +131,16 @@ class Rest:
                 words += [int(finger in points), *points.get(finger, np.zeros(3))]
         return " ".join(repr(float(x)) for x in words)
 
-    def end_of(self, bone: int) -> Array | None:
-        """Where a bone ends: at the next one of its finger, or at its tip."""
-        later = [k for k in range(bone + 1, 3 * (bone // 3) + 3) if k in self.bones]
-        return self.positions[later[0]] if later else self.tips.get(bone // 3)
+    def end_of(self, bone: int) -> Array:
+        """Where a bone ends: at the next one of its finger, at its tip, or where the import guesses that."""
+        finger = range(3 * (bone // 3), 3 * (bone // 3) + 3)
+        later = [k for k in finger if k > bone and k in self.bones]
+        if later:
+            return self.positions[later[0]]
+        if bone // 3 in self.tips:
+            return self.tips[bone // 3]
+        before = [k for k in finger if k < bone and k in self.bones][-1]
+        return self.positions[bone] + TIP_SHARE * (self.positions[bone] - self.positions[before])
 
     def pose(self, turned: Array) -> dict[int, Array]:
         """Positions of the bones `0..14` and of the tips `15..19`, with bone rotations `(15, 4)` in the hand's space.
@@ -146,8 +153,6 @@ class Rest:
             for k in chain:
                 out.setdefault(k, self.positions[k])
                 end = self.end_of(k)
-                if end is None:
-                    continue
                 after = next((m for m in chain if m > k), 15 + finger)
                 local = quat_rotate(quat_conjugate(self.rotations[k]), end - self.positions[k])
                 out[after] = out[k] + quat_rotate(turned[k], local)
