@@ -142,6 +142,9 @@ def csharp_layout() -> str:
     for name, table in ZERO_POSE.items():
         lines += [f"        public static readonly float[] {_pascal(name)} =", "        {"]
         lines += [f"            {', '.join(f'{x}f' for x in row)}," for row in table.tolist()] + ["        };"]
+    lines += ["        /// <summary>OpenXR joints of a straight right hand, in the frame of its wrist joint.</summary>"]
+    lines += ["        public static readonly float[] RestJoints =", "        {"]
+    lines += [f"            {', '.join(f'{x}f' for x in row)}," for row in REST_JOINTS.tolist()] + ["        };"]
     return "\n".join([*lines, "    }", "}"]) + "\n"
 
 
@@ -177,6 +180,12 @@ def cpp_rig_names() -> str:
         for bone in range(15):
             names = rig_names.finger_names(side, bone // 3, bone % 3)
             lines += [f'    {{"{name}", {number}, {bone}}},' for name in names]
+    lines += ["};", "", "/// The bones in the palm, counted by the four fingers."]
+    lines += ["inline constexpr Finger kMetacarpals[] = {"]
+    for number, side in enumerate(SIDES):
+        for finger in range(1, 5):
+            names = rig_names.metacarpal_names(side, finger)
+            lines += [f'    {{"{name}", {number}, {finger - 1}}},' for name in names]
     return "\n".join([*lines, "};", "", "}  // namespace manipnet::rig_names"]) + "\n"
 
 
@@ -231,6 +240,7 @@ def _rig_tables() -> dict[str, dict[Side, list[str]]]:
         "finger_bones": {side: bone_names(side) for side in SIDES},
         "hand_bones": {side: [" ".join(rig_names.hand_names(side))] for side in SIDES},
         "thumb_metacarpals": {side: [" ".join(rig_names.metacarpal_names(side, 0))] for side in SIDES},
+        "metacarpals": {side: [" ".join(rig_names.metacarpal_names(side, f)) for f in range(1, 5)] for side in SIDES},
     }
 
 

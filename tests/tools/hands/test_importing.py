@@ -1,10 +1,10 @@
 """Hands of avatars imported from rigs: names, units, sides, straightening, and what is refused."""
 
 import json
-import struct
 
 import numpy as np
 import pytest
+from rig_writer import write_glb
 
 from manipnet.geometry import SIDES, quat_exp, quat_rotate
 from manipnet.synthesis.hand.avatar import model_profile
@@ -35,27 +35,6 @@ def rig(scale=1.0, name="{side}Hand{word}{n}", hand="{side}Hand", tips=True, sid
                     nodes.append((name.format(side=side.capitalize(), word=word, n=n + 1), parent, placed[k]))
                     parent = len(nodes) - 1
     return nodes
-
-
-def write_glb(path, nodes, **more):
-    children = {n: [k for k, (_, parent, _) in enumerate(nodes) if parent == n] for n in range(len(nodes))}
-    document = {
-        "asset": {"version": "2.0"},
-        "scenes": [{"nodes": [0]}],
-        "nodes": [
-            {
-                "name": name,
-                "translation": (place - (nodes[parent][2] if parent >= 0 else 0.0)).tolist(),
-                **({"children": children[n]} if children[n] else {}),
-            }
-            for n, (name, parent, place) in enumerate(nodes)
-        ],
-        **more,
-    }
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    path.write_bytes(b"glTF" + struct.pack("<2I", 2, 20 + len(text)) + struct.pack("<I4s", len(text), b"JSON") + text)
-    return path
 
 
 def write_bvh(path, nodes):
