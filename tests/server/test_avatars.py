@@ -1,7 +1,9 @@
 """Hands solved on avatars, by a real server: upload, topics, limits of number, a rig's own profile."""
 
 import json
+import socket
 import time
+from contextlib import ExitStack
 
 import msgpack
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 import zmq
 from avatar_profiles import as_content, scaled_profile
 from live_server import serving
+from pythonosc.osc_bundle import OscBundle
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
@@ -24,10 +27,23 @@ LONG, SMALL = scaled_profile(MODEL, 1.15, name="long"), scaled_profile(MODEL, wh
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory):
+def receivers():
+    """The programs that the server sends hands to, by its options."""
+    with ExitStack() as opened:
+        sockets = {}
+        for option in ("--vmc", "--livelink"):
+            sockets[option] = opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            sockets[option].bind(("127.0.0.1", 0))
+            sockets[option].settimeout(20.0)
+        yield sockets
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, receivers):
     file = tmp_path_factory.mktemp("hand") / "small.json"
     file.write_text(profile_to_json(SMALL), encoding="utf-8")
-    with serving("--demo", "--hand", str(file)) as server:
+    to = [f"{option}=127.0.0.1:{receiver.getsockname()[1]}" for option, receiver in receivers.items()]
+    with serving("--demo", "--hand", str(file), *to) as server:
         yield server
 
 
@@ -80,6 +96,19 @@ def test_the_hand_of_the_command_line_is_there_from_the_start(server):
     assert len(found["hand/small/bin"]) > 30
 
 
+def test_programs_that_show_avatars_get_the_hand_of_the_command_line(server, receivers):
+    subjects = {next(iter(json.loads(receivers["--livelink"].recv(65536)))) for _ in range(60)}
+    assert {"ManipNet_actor_small_left", "ManipNet_actor_right"} <= subjects
+    bundle = OscBundle(receivers["--vmc"].recv(4096))
+    bones = {m.params[0]: m.params[1:] for m in bundle if m.address == "/VMC/Ext/Bone/Pos"}
+    side = "left" if "LeftHand" in bones else "right"
+    rest = SMALL.hands[side].joints
+    for name, a, b in (("IndexProximal", 1, 7), ("IndexDistal", 8, 9), ("ThumbIntermediate", 2, 3)):
+        length = np.linalg.norm(bones[f"{side.capitalize()}{name}"][:3])
+        assert length == pytest.approx(np.linalg.norm(rest[b, :3] - rest[a, :3]), abs=1e-5)
+    assert server.ask({"op": "status"})["counters"]["messages_out"]["vmc"] > 0
+
+
 @pytest.mark.parametrize(
     ("request_", "reason"),
     [
@@ -103,7 +132,7 @@ class Audience:
     def wants(self, avatar):
         return avatar in self.wanted
 
-    def publish_avatar(self, message):
+    def publish_avatar(self, message, profile):
         raise AssertionError
 
 

@@ -4,8 +4,8 @@ The command line, the rig file, the counters, the `ready` line and the documenta
 declaration loads at `--help`, so it imports heavy libraries only inside `open`.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from manipnet.common.options import Protocol
 if TYPE_CHECKING:
     from manipnet.net.curve_keys import ServerKeys
     from manipnet.synthesis.hand.hand import Hand
+    from manipnet.synthesis.hand.profile import HandProfile
     from manipnet.telemetry import Telemetry
     from manipnet.wire import HandsMessage
 
@@ -38,6 +39,8 @@ class Emission:
     """The address of this machine to listen on."""
     keys: "ServerKeys | None" = None
     """The keys that clients must have where a protocol knows keys."""
+    avatars: Mapping[str, str] = field(default_factory=dict)
+    """The name of the avatar that was given for an actor at the start, by the actor's name."""
     submit: Submit = no_requests
     """Takes the requests of clients that receive hands. Only `hand_profile` is allowed."""
 
@@ -77,11 +80,13 @@ class HandsOutput:
         """Whether a client has subscribed to the hands of an avatar, by the name of its profile."""
         return False
 
-    def send_avatar(self, hands: EncodedHands) -> None:
-        """Send the hands of an avatar, which the message's `hand` names, in the encodings that clients want.
+    def send_avatar(self, hands: EncodedHands, profile: "HandProfile") -> bool:
+        """Send the hands of an avatar, whose profile is given, in the encodings that clients want.
 
+        Returns whether they were sent in place of the model's hands, which `send` has left out.
         Raises `OSError` if they cannot be sent, and `MessageError` for a message that breaks the protocol's rules.
         """
+        return False
 
     def close(self) -> None:
         """Close the sockets. Does nothing the second time."""

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable, Mapping
 
 from manipnet.outputs.declaration import EncodedHands, HandsOutput, Output
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 from manipnet.wire import HandsMessage
 
@@ -51,12 +52,14 @@ class Publisher:
         """Whether anybody has subscribed to the hands of an avatar, by the name of its profile."""
         return any(output.wants(avatar) for output in self._outputs.values())
 
-    def publish_avatar(self, message: HandsMessage) -> None:
-        """Send the hands of an avatar, which `message.hand` names. Raises `MessageError` as `publish` does."""
+    def publish_avatar(self, message: HandsMessage, profile: HandProfile) -> None:
+        """Send the hands of an avatar, whose profile is given. Raises `MessageError` as `publish` does."""
         hands = EncodedHands(message)
         for declared, output in self._outputs.items():
             try:
-                output.send_avatar(hands)
+                if output.send_avatar(hands, profile):
+                    for topic in declared.labels:
+                        self._telemetry.count("messages_out", topic=topic)
             except OSError as error:
                 _log.warning("%s: an avatar's hands cannot be sent: %s", declared.name, error)
 

@@ -47,7 +47,8 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     def submit(request: bytes, reply: Callable[[bytes], object]) -> None:
         dispatcher.submit([request], reply, here=False, ops=RECEIVERS_OPS)
 
-    outputs = open_outputs(config.of, Emission(telemetry, session.bundle.hand, config.host, keys, submit))
+    emission = Emission(telemetry, session.bundle.hand, config.host, keys, session.given_avatars, submit)
+    outputs = open_outputs(config.of, emission)
     publisher = Publisher(outputs, telemetry, recorder.note)
     opened.callback(publisher.close)
     session.avatars.audience = publisher

@@ -1,5 +1,6 @@
 """From a rig to a hand profile: the 26 OpenXR joints at rest with straight fingers, and radii from the skin."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -12,7 +13,7 @@ from manipnet.geometry import SIDES, Array, Side, matrix_to_quat, mirror_poses
 from manipnet.synthesis.hand.avatar import model_profile, openxr_frame
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.openxr import METACARPAL_BASE
-from manipnet.synthesis.hand.profile import FINGERS, HandProfile, ProfileHand, parse_profile
+from manipnet.synthesis.hand.profile import FINGERS, HandProfile, ProfileHand, parse_profile, profile_to_json
 from manipnet_tools.hands.bone_map import BoneMap, map_bones, read_map
 from manipnet_tools.hands.rig_file import RigFileError, Skeleton, read_skeleton
 
@@ -23,6 +24,8 @@ TIP_SHARE: Final = 0.8
 """The last bone of a finger relative to the one before it, where neither the rig nor the skin shows its end."""
 THUMB_BEHIND: Final = 0.08
 """How far the thumb's last joint may be behind the knuckles, relative to the length of the palm."""
+T_POSE: Final = 0.94, 0.7
+"""An avatar is in T-pose if its hand points to the side within 20 degrees, and its palm down within 45 (cosines)."""
 RADIUS_SHARES: Final = (0.5, 1.7)
 """How far a radius from the skin may be from the guess by lengths."""
 
@@ -52,10 +55,8 @@ def import_profile(
         if side not in maps:
             say(f"{side}: the file has no {side} hand; it will be the mirror image of the other")
             continue
-        hand = _RigHand(skeleton, maps[side], side, unit, model, str(path), say).profile()
-        joints = [None if np.isnan(row).any() else row.tolist() for row in hand.joints]
-        hands[side] = {"joints": joints, "radii": [None if np.isnan(r) else float(r) for r in hand.radii]}
-    return parse_profile({"name": name, **hands})
+        hands[side] = _RigHand(skeleton, maps[side], side, unit, model, str(path), say).profile()
+    return parse_profile(json.loads(profile_to_json(HandProfile(name, hands))))
 
 
 def _unit(skeleton: Skeleton, maps: dict[Side, BoneMap], say: Callable[[str], None]) -> float:
@@ -91,6 +92,7 @@ class _RigHand:
         self._skin = unit * (skeleton.vertices - skeleton.heads[bones[1]]) * flip
         self._ends = {k: unit * (end - skeleton.heads[bones[1]]) * flip for k, end in skeleton.ends.items()}
         turn = self._palm_frame()
+        self._to_wrist, self._flip, self._tips = turn, flip, {}
         self._points, self._skin = self._points @ turn, self._skin @ turn
         self._ends = {k: end @ turn for k, end in self._ends.items()}
 
@@ -117,7 +119,34 @@ class _RigHand:
         self._say(f"hand bone {self._skeleton.names[self._bones[1]]}; " + ", ".join(named))
         if self._side == "left":
             joints = mirror_poses(joints)
-        return ProfileHand(joints, radii)
+        return ProfileHand(joints, radii, *self._t_pose())
+
+    def _t_pose(self) -> tuple[Array | None, Array | None]:
+        """The joints `(26, 3)` and the elbow in the T-pose of an avatar that faces +z; None for another rest pose."""
+        places = np.full((26, 3), np.nan)
+        bones = {k: bone for row in FINGERS for k in row[:-1] if (bone := self._bones.get(k)) is not None}
+        for k, bone in bones.items():
+            places[k] = self._points[bone]
+        for k, tip in self._tips.items():
+            places[k] = tip
+        places = places @ self._to_wrist.T * self._flip
+        palm = np.nanmean(places, axis=0)
+        to_side, up = abs(palm[0]) / np.linalg.norm(palm), self._to_wrist[1, 1]
+        if to_side < T_POSE[0] or up < T_POSE[1]:
+            return None, None
+        forward = np.sign(palm[0]) * (1.0 if self._side == "left" else -1.0)
+        turn = np.array([forward, 1.0, forward])
+        elbow = self._elbow(float(np.linalg.norm(palm)))
+        return turn * places, None if elbow is None else turn * (elbow @ self._to_wrist.T * self._flip)
+
+    def _elbow(self, least: float) -> Array | None:
+        """The first bone above the hand that is farther from it than `least`, so not a twist bone."""
+        bone = self._skeleton.parents[self._bones[1]]
+        while bone >= 0:
+            if np.linalg.norm(self._points[bone]) > least:
+                return self._points[bone]
+            bone = self._skeleton.parents[bone]
+        return None
 
     def _palm_frame(self) -> Array:
         """The rotation to the frame in which the knuckles lie as the model's do (Kabsch's method)."""
@@ -160,6 +189,7 @@ class _RigHand:
     def _add_finger(self, row: tuple[int, ...], chain: list[int], joints: Array, radii: Array) -> None:
         points = [self._points[self._bones[k]] for k in chain]
         points.append(self._tip(row, chain, points))
+        self._tips[row[-1]] = points[-1]
         lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(points)]
         along = (points[1] - points[0]) / max(lengths[0], 1e-9)
         bends = [

@@ -21,6 +21,7 @@ from manipnet.net.half_open import BACKLOG, HalfOpen, handshake_log
 from manipnet.outputs.declaration import EncodedHands, HandsOutput, Submit, no_requests
 from manipnet.outputs.websocket.client import AVATAR_PATH, MAX_REQUESTS, Client, answer_to, avatar_of
 from manipnet.outputs.websocket.token import SUBPROTOCOL, shows_token
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 
 MAX_CLIENTS = 32
@@ -76,10 +77,11 @@ class WebSocketPublisher(HandsOutput):
         """Whether a client is connected at the path of the avatar. From any thread."""
         return any(client.avatar == avatar for client in self._clients)
 
-    def send_avatar(self, hands: EncodedHands) -> None:
+    def send_avatar(self, hands: EncodedHands, profile: HandProfile) -> bool:
         """Offer the hands of an avatar to the clients at its path."""
-        if self.wants(str(hands.message.hand)):
-            self.publish(hands.binary, hands.message.hand)
+        if self.wants(profile.name):
+            self.publish(hands.binary, profile.name)
+        return False
 
     def publish(self, payload: bytes, avatar: str | None = None) -> bool:
         """Offer one payload to the clients at the path of an avatar, or without one to those of the model's hand.

@@ -8,6 +8,7 @@ from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.supervised import Pauses, ReceiverHealth
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, hand_topics
 
@@ -53,12 +54,12 @@ class ZmqPublisher(HandsOutput):
         self._read_subscriptions()
         return any(self._is_subscribed(topic) for topic in hand_topics(avatar))
 
-    def send_avatar(self, hands: EncodedHands) -> None:
+    def send_avatar(self, hands: EncodedHands, profile: HandProfile) -> bool:
         """Publish the hands of an avatar under those of its topics that have subscribers."""
         if self._retry_s is not None:
-            return
+            return False
         try:
-            msgpack_topic, binary_topic = hand_topics(str(hands.message.hand))
+            msgpack_topic, binary_topic = hand_topics(profile.name)
             if self._is_subscribed(msgpack_topic):
                 self._bound.socket.send(msgpack_topic + hands.msgpack)
             if self._is_subscribed(binary_topic):
@@ -66,6 +67,7 @@ class ZmqPublisher(HandsOutput):
         except zmq.ZMQError as error:
             self._bound.close()
             self._fail(error)
+        return False
 
     def _is_subscribed(self, topic: bytes) -> bool:
         return any(topic.startswith(prefix) for prefix in self._subscribed)
