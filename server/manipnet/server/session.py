@@ -57,6 +57,8 @@ class Session:
         self.actors = [self._load_actor(actor) for actor in config.actors]
         profiles = {actor.name: read_profile(actor.hand) for actor in config.actors if actor.hand is not None}
         avatars = {actor: Avatar(profile, self.bundle.hand) for actor, profile in profiles.items()}
+        self.given_avatars = {actor: profile.name for actor, profile in profiles.items()}
+        """The name of the profile that was given for an actor at the start, by the actor's name."""
         self.avatars = avatars_of(self.actors, avatars, self.telemetry)
         self._mailbox = Mailbox(self.telemetry)
         self._proxy = ActorsProxy(self.actors, self._mailbox)

@@ -97,6 +97,37 @@ def test_a_vrm_file_names_its_bones_itself(tmp_path):
     same_hand(import_profile(file, "a", MODEL, lambda _: None), "right")
 
 
+@pytest.mark.parametrize("facing", [1.0, -1.0])
+def test_the_bones_of_a_t_pose_are_kept_whichever_way_the_avatar_faces(tmp_path, facing):
+    """VRM 1 faces +z in its file, and VRM 0 faces -z; in a profile, everybody faces +z."""
+    nodes, expected = [("Hips", -1, np.zeros(3))], {}
+    for side, along in zip(SIDES, (1.0, -1.0), strict=True):
+        palm = np.array([[0.0, 0.0, -along], [0.0, 1.0, 0.0], [along, 0.0, 0.0]])
+        expected[side] = model_profile(MODEL, side).joints[:, :3] @ palm.T
+        yaw, at = np.array([facing, 1.0, facing]), np.array([0.7 * along, 1.4, 0.1])
+        elbow = len(nodes)
+        nodes.append((f"{side.capitalize()}ForeArm", 0, yaw * (at + np.array([-0.24 * along, 0.01, 0.0]))))
+        nodes.append((f"{side.capitalize()}Hand", elbow, yaw * at))
+        for word, row in zip(WORDS, FINGERS, strict=True):
+            parent = elbow + 1
+            for n, k in enumerate(row if word == "Thumb" else row[1:]):
+                nodes.append((f"{side.capitalize()}Hand{word}{n + 1}", parent, yaw * (at + expected[side][k])))
+                parent = len(nodes) - 1
+    profile = import_profile(write_glb(tmp_path / "a.glb", nodes), "a", MODEL, lambda _: None)
+    bones = [k for row in FINGERS for k in (row if row is FINGERS[0] else row[1:])]
+    for side, along in zip(SIDES, (1.0, -1.0), strict=True):
+        t_pose, elbow = profile.hands[side].t_pose, profile.hands[side].elbow
+        assert t_pose is not None
+        assert elbow is not None
+        np.testing.assert_allclose(t_pose[bones], expected[side][bones], atol=1e-6)
+        np.testing.assert_allclose(elbow, [-0.24 * along, 0.01, 0.0], atol=1e-6)
+
+
+def test_a_rig_in_another_pose_has_no_t_pose(tmp_path):
+    profile = import_profile(write_glb(tmp_path / "a.glb", rig()), "a", MODEL, lambda _: None)
+    assert all(profile.hands[side].t_pose is None for side in SIDES)
+
+
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (100.0, "centimetres"), (10.0, "decimetres")])
 def test_the_unit_of_a_bvh_file_is_guessed_and_said(tmp_path, scale, unit):
     said = []

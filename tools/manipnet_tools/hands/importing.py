@@ -1,5 +1,6 @@
 """From a rig to a hand profile: the 26 OpenXR joints at rest with straight fingers, and radii from the skin."""
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 
 from manipnet.geometry import SIDES, Side
 from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.hand.profile import HandProfile, parse_profile
+from manipnet.synthesis.hand.profile import HandProfile, ProfileHand, parse_profile, profile_to_json
 from manipnet_tools.hands.bone_map import BoneMap, map_bones, read_map
 from manipnet_tools.hands.rig_file import Skeleton, read_skeleton
 from manipnet_tools.hands.rig_hand import RigHand, rig_hand
@@ -51,15 +52,17 @@ def import_rig(
     skeleton = read_skeleton(path)
     maps = map_bones(skeleton, str(path)) if map_file is None else read_map(map_file, skeleton)
     unit = 1.0 if skeleton.in_metres else _unit(skeleton, maps, say)
-    hands, content = {}, {}
+    hands: dict[Side, RigHand] = {}
     for side in SIDES:
         if side not in maps:
             say(f"{side}: the file has no {side} hand; it will be the mirror image of the other")
             continue
-        hand = hands[side] = rig_hand(skeleton, maps[side], side, unit, model, str(path), say)
-        joints = [None if np.isnan(row).any() else row.tolist() for row in hand.joints]
-        content[side] = {"joints": joints, "radii": [None if np.isnan(r) else float(r) for r in hand.radii]}
-    return ImportedRig(parse_profile({"name": name, **content}), skeleton, unit, hands)
+        hands[side] = rig_hand(skeleton, maps[side], side, unit, model, str(path), say)
+    described: dict[Side, ProfileHand] = {
+        side: ProfileHand(hand.joints, hand.radii, hand.t_pose, hand.elbow) for side, hand in hands.items()
+    }
+    profile = parse_profile(json.loads(profile_to_json(HandProfile(name, described))))
+    return ImportedRig(profile, skeleton, unit, hands)
 
 
 def _unit(skeleton: Skeleton, maps: dict[Side, BoneMap], say: Callable[[str], None]) -> float:

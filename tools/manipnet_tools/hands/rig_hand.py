@@ -21,6 +21,8 @@ THUMB_BEHIND: Final = 0.08
 """How far the thumb's last joint may be behind the knuckles, relative to the length of the palm."""
 PALMAR: Final = 0.6
 """Cosine of the largest angle between the direction of the palm and that in which a radius is measured."""
+T_POSE: Final = 0.94, 0.7
+"""An avatar is in T-pose if its hand points to the side within 20 degrees, and its palm down within 45 (cosines)."""
 RADIUS_SHARES: Final = (0.5, 1.7)
 """How far a radius from the skin may be from the guess by lengths."""
 
@@ -37,6 +39,10 @@ class RigHand:
     bind: Array
     """`(26, 7)` the same joints as the fingers of the rig are at rest, in the world of the file, metres. A bone of the
     rig turns with its joint from there."""
+    t_pose: Array | None
+    """`(26, 3)` the joints in the avatar's T-pose, as `ProfileHand.t_pose`."""
+    elbow: Array | None
+    """`(3,)` the elbow in the T-pose, as `ProfileHand.elbow`."""
 
 
 def rig_hand(
@@ -68,6 +74,9 @@ class _RigHand:
         self._skin = unit * (skeleton.vertices - skeleton.heads[bones[1]]) * flip
         self._ends = {k: unit * (end - skeleton.heads[bones[1]]) * flip for k, end in skeleton.ends.items()}
         turn = self._palm_frame()
+        self._to_wrist, self._flip = turn, flip
+        self._tips: dict[int, Array] = {}
+        """Where each finger ends, by its last joint."""
         world = MIRROR @ turn @ MIRROR if side == "left" else turn
         self._wrist = np.concatenate([unit * skeleton.heads[bones[1]], matrix_to_quat(world)])
         self._points, self._skin = self._points @ turn, self._skin @ turn
@@ -99,7 +108,34 @@ class _RigHand:
         bind[in_palm] = joints[in_palm]
         if self._side == "left":
             joints, bind = mirror_poses(joints), mirror_poses(bind)
-        return RigHand(self._bones, joints, radii, compose(self._wrist, bind))
+        return RigHand(self._bones, joints, radii, compose(self._wrist, bind), *self._t_pose())
+
+    def _t_pose(self) -> tuple[Array | None, Array | None]:
+        """The joints `(26, 3)` and the elbow in the T-pose of an avatar that faces +z; None for another rest pose."""
+        places = np.full((26, 3), np.nan)
+        bones = {k: bone for row in FINGERS for k in row[:-1] if (bone := self._bones.get(k)) is not None}
+        for k, bone in bones.items():
+            places[k] = self._points[bone]
+        for k, tip in self._tips.items():
+            places[k] = tip
+        places = places @ self._to_wrist.T * self._flip
+        palm = np.nanmean(places, axis=0)
+        to_side, up = abs(palm[0]) / np.linalg.norm(palm), self._to_wrist[1, 1]
+        if to_side < T_POSE[0] or up < T_POSE[1]:
+            return None, None
+        forward = np.sign(palm[0]) * (1.0 if self._side == "left" else -1.0)
+        turn = np.array([forward, 1.0, forward])
+        elbow = self._elbow(float(np.linalg.norm(palm)))
+        return turn * places, None if elbow is None else turn * (elbow @ self._to_wrist.T * self._flip)
+
+    def _elbow(self, least: float) -> Array | None:
+        """The first bone above the hand that is farther from it than `least`, so not a twist bone."""
+        bone = self._skeleton.parents[self._bones[1]]
+        while bone >= 0:
+            if np.linalg.norm(self._points[bone]) > least:
+                return self._points[bone]
+            bone = self._skeleton.parents[bone]
+        return None
 
     def _palm_frame(self) -> Array:
         """The rotation to the frame in which the knuckles lie as the model's do (Kabsch's method)."""
@@ -142,6 +178,7 @@ class _RigHand:
     def _add_finger(self, row: tuple[int, ...], chain: list[int], joints: Array, bind: Array, radii: Array) -> None:
         points = [self._points[self._bones[k]] for k in chain]
         points.append(self._tip(row, chain, points))
+        self._tips[row[-1]] = points[-1]
         lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(points)]
         along = (points[1] - points[0]) / max(lengths[0], 1e-9)
         bends = [
