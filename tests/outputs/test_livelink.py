@@ -47,7 +47,7 @@ def test_one_datagram_per_hand_arrives():
         receiver.bind(("127.0.0.1", 0))
         receiver.settimeout(10)
         sender = livelink_json.LiveLinkJsonSender("127.0.0.1", receiver.getsockname()[1])
-        sender.send(EncodedHands(LIVE, b"", b""))
+        sender.send(EncodedHands(LIVE))
         subjects = [next(iter(json.loads(receiver.recv(65536)))) for _ in range(2)]
         sender.close()
     assert subjects == ["ManipNet_actor_left", "ManipNet_actor_right"]

@@ -9,6 +9,8 @@ import pytest
 import zmq
 from avatar_profiles import as_content, scaled_profile
 from live_server import serving
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from manipnet.actors.avatar import Avatar
 from manipnet.runtime.avatars import FORGET_AFTER_S, MAX_PROFILES, Avatars, TooManyProfilesError
@@ -141,6 +143,42 @@ def test_a_wrong_hand_file_stops_the_start(tmp_path):
     server = LiveServer("--demo", "--hand", str(file))
     assert server.process.wait(120) == 1
     assert "has neither a left nor a right hand" in "".join(server.errors)
+
+
+def uploaded(connection, request):
+    return answered(connection, json.dumps(request))
+
+
+def answered(connection, message):
+    """The answer to a message over WebSocket, whose text comes among binary payloads."""
+    connection.send(message)
+    while isinstance(answer := connection.recv(timeout=20), bytes):
+        pass
+    return json.loads(answer)
+
+
+def test_a_browser_uploads_its_hand_and_receives_it_over_one_websocket(server):
+    profile = scaled_profile(MODEL, 1.1, name="bröwser")
+    with connect(f"{server.addresses['web']}/hand/br%C3%B6wser", origin=Origin("http://localhost:8000")) as connection:
+        answer = uploaded(connection, {"op": "hand_profile", **as_content(profile)})
+        assert (answer["name"], answer["topics"][1]) == ("bröwser", "hand/bröwser/bin")
+        hand = decode_binary(connection.recv(timeout=20, decode=False)).hands["left"]
+        rest = profile.hands["left"].joints
+        for a, b in ((7, 8), (8, 9), (3, 4)):
+            assert np.linalg.norm(hand.joints[b, :3] - hand.joints[a, :3]) == pytest.approx(
+                np.linalg.norm(rest[b, :3] - rest[a, :3]), abs=1e-5
+            )
+
+
+def test_a_bad_upload_over_websocket_costs_only_itself(server):
+    with connect(f"{server.addresses['web']}/hand/small") as connection:
+        assert "allowed is hand_profile" in uploaded(connection, {"op": "rest"})["error"]
+        assert "neither a left nor a right" in uploaded(connection, {"op": "hand_profile", "name": "x"})["error"]
+        assert "neither a msgpack nor a JSON map" in answered(connection, '{"a":' * 10_000)["error"]
+        assert "must be a text message" in answered(connection, b"\x81\xa2op\xachand_profile")["error"]
+        for _ in range(60):
+            assert connection.recv(timeout=20)
+    assert server.ask({"op": "ping"})["t"] > 0
 
 
 def test_the_python_client_uploads_and_receives(server):

@@ -1,5 +1,6 @@
 """Everything of a server that listens or sends, and the loop between its ends."""
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Final
@@ -20,6 +21,8 @@ from manipnet.server.session import Session
 from manipnet.synthesis.hand.hand_file import HAND_FILE
 
 LOOPBACK: Final = "127.0.0.1"
+RECEIVERS_OPS: Final = ("hand_profile",)
+"""The operations that are open to clients that only receive hands, as browsers do."""
 
 
 @dataclass(frozen=True)
@@ -38,15 +41,19 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     config, telemetry = session.config, session.telemetry
     recorder = Recorder(config.takes, session.recording_context, telemetry)
     opened.callback(recorder.stop)
-    outputs = open_outputs(config.of, Emission(telemetry, session.bundle.hand, config.host, keys))
+    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers()}, telemetry)
+    opened.callback(dispatcher.close)
+
+    def submit(request: bytes, reply: Callable[[bytes], object]) -> None:
+        dispatcher.submit([request], reply, here=False, ops=RECEIVERS_OPS)
+
+    outputs = open_outputs(config.of, Emission(telemetry, session.bundle.hand, config.host, keys, submit))
     publisher = Publisher(outputs, telemetry, recorder.note)
     opened.callback(publisher.close)
     session.avatars.audience = publisher
     meshes = MeshWatch(session.catalog, session.replace_shape)
     opened.callback(meshes.stop)
     meshes.start()
-    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers()}, telemetry)
-    opened.callback(dispatcher.close)
     control = Control(config.host, config.control_port, dispatcher, telemetry, keys)
     opened.callback(control.stop)
     control.start()
