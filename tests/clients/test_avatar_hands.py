@@ -15,10 +15,9 @@ from manipnet_client.avatar import (
     avatar_profile,
 )
 from manipnet_client.message import Hand
-from random_hand import HAND
 from test_retarget import foreign_rig
 
-from manipnet.geometry import compose, invert, quat_conjugate, quat_exp, quat_multiply, quat_rotate
+from manipnet.geometry import compose, quat_conjugate, quat_exp, quat_rotate
 from manipnet.synthesis.hand.profile import parse_profile
 
 
