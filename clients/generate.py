@@ -11,6 +11,7 @@ import numpy as np
 
 from manipnet import __version__
 from manipnet.geometry import SIDES, Side, compose, invert, matrix_to_quat
+from manipnet.synthesis.hand.avatar import model_radii
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -56,6 +57,9 @@ _zero_joints = pose_in_world(
 _WRIST = OPENXR_JOINT_NAMES.index("wrist")
 REST_JOINTS = compose(invert(_zero_joints[[_WRIST] * len(_zero_joints)]), _zero_joints).round(8) + 0.0
 """OpenXR joints `(26, 7)` of a right hand with all angles zero, in the frame of its wrist joint."""
+
+REST_RADII = model_radii(shipped_hand()).round(6)
+"""Distance of the skin of that hand from each joint, `(26,)`, m."""
 
 NAMES = {
     "states": STATES,
@@ -105,9 +109,11 @@ def python_layout() -> str:
     for name, words in {**NAMES, "joint_parents": OPENXR_PARENTS}.items():
         body = "".join(f"    {json.dumps(word)},\n" for word in words)
         lines += [f"{name.upper()} = (\n{body})"]
-    for name, table in ZERO_POSE.items():
+    for name, table in {**ZERO_POSE, "rest_joints": REST_JOINTS}.items():
         body = "".join(f"        {json.dumps(row.tolist())},\n" for row in table)
         lines += [f"{name.upper()} = np.array(\n    [\n{body}    ]\n)"]
+    radii = "".join(f"        {radius},\n" for radius in REST_RADII.tolist())
+    lines += [f"REST_RADII = np.array(\n    [\n{radii}    ]\n)"]
     for record, dtype in {**RECORDS, "timed_header": TIMED_HEADER}.items():
         lines += ["", f"{record.upper()} = np.dtype(", "    {", f'        "itemsize": {dtype.itemsize},']
         fields = [(name, _python_format(kind), offset) for name, (kind, offset) in _fields(dtype).items()]
@@ -205,6 +211,23 @@ def javascript_layout() -> str:
     webxr = [webxr_name(name) for name in OPENXR_JOINT_NAMES]
     for name, words in {**NAMES, "joint_names": webxr, "joint_parents": OPENXR_PARENTS}.items():
         lines += [f"export const {name.upper()} = {json.dumps(words)};"]
+    rows = "".join(f"  {json.dumps(row)},\n" for row in REST_JOINTS.tolist())
+    lines += [
+        f"export const REST_JOINTS = [\n{rows}];",
+        f"export const REST_RADII = {json.dumps(REST_RADII.tolist())};",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def javascript_rig_names() -> str:
+    """Names of bones in their plain form, of which the first that a rig has is taken."""
+    lines = [f"// {NOTE}"]
+    for name, table in _rig_tables().items():
+        rows = "".join(
+            f"  {side}: {json.dumps([t.split() for t in texts], ensure_ascii=False)},\n"
+            for side, texts in table.items()
+        )
+        lines += [f"export const {name.upper()} = {{\n{rows}}};"]
     return "\n".join(lines) + "\n"
 
 
@@ -269,6 +292,7 @@ def files() -> dict[Path, str]:
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RestJoints.h": cpp_rest_joints(),
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RigNames.h": cpp_rig_names(),
         FOLDER / "web/layout.js": javascript_layout(),
+        FOLDER / "web/rig-names.js": javascript_rig_names(),
         **manifests(),
     }
 

@@ -153,8 +153,8 @@ def shown_when(client, ready):
 def is_a_hand(joints, rest, unit):
     """Whether the bones in a message have the lengths of the rig's.
 
-    What a client shows is a mean of frames. It is not exactly a hand where the hand jumps from one frame to the next, as
-    that of the tests' small model sometimes does.
+    What a client shows is a mean of frames. It is not exactly a hand where the hand jumps from one frame to the next,
+    as that of the tests' small model sometimes does.
     """
     places = np.array(joints).reshape(26, 7)[:, :3]
     for bone, place in rest.positions.items():
