@@ -13,6 +13,7 @@ from manipnet.actors.avatar import Avatar
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, ServerConfig
 from manipnet.control.actors_proxy import ActorsProxy
+from manipnet.control.body_gauges import body_gauges
 from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.hand_requests import HandRequests
 from manipnet.control.peers import Peers
@@ -66,6 +67,7 @@ class Session:
         """Where the receivers leave frames."""
         self.peers = Peers(self.senders)
         self.telemetry.add_gauges(self.peers.gauges)
+        self.telemetry.add_gauges(lambda: body_gauges(self._proxy))
         self.addresses: dict[str, str] = {}
         """The address of every socket by what it carries, once they are open."""
 
