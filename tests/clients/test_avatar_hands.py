@@ -16,7 +16,7 @@ from languages import LiveClient, run
 from live_server import Stage, scene, serving
 from make_hand_profiles import vectors
 
-from manipnet.geometry import SIDES, quat_rotate
+from manipnet.geometry import SIDES, Side, quat_rotate
 from manipnet.outputs.axes import to_unity, to_unreal
 from manipnet.wire.rig_names import FINGER_PATTERNS, METACARPAL_PATTERNS, find_bones, finger_names, metacarpal_names
 
@@ -73,7 +73,7 @@ def test_bones_are_found_as_the_import_finds_them(harness, language):
         rigs += [names, [f"Anna_{name}" for name in names], [*names, *rigs[k % len(KINDS)]]]
     rigs += [["Thumb0_L", "Thumb1_L", "Thumb2_L", "Left wrist"], ["LeftThumbProximal", "LeftThumbMetacarpal"], ["Hips"]]
     rigs = [[names[i] for i in rng.permutation(len(names))] for names in rigs]
-    questions = [(side, names) for names in rigs for side in SIDES]
+    questions: list[tuple[Side, list[str]]] = [(side, names) for names in rigs for side in SIDES]
     lines = run(harness(language), "find", text="".join("\t".join([s, *names]) + "\n" for s, names in questions))
     for line, (side, names) in zip(lines, questions, strict=True):
         found = find_bones(names)[side]

@@ -121,7 +121,7 @@ def core(harness):
 
 def test_skeleton_equals_that_of_the_json_output(core):
     live = messages()["live"]
-    bones = json.loads(hand_json("a", "left", live.hands["left"].joints))["ManipNet_a_left"]
+    bones = json.loads(hand_json("a_left", live.hands["left"].joints))["ManipNet_a_left"]
     lines = run(core, "skeleton", text=(VECTORS / "live.bin").read_bytes().hex() + "\n")
     for line, bone in zip(lines, bones, strict=True):
         name, parent, *pose = line.split()

@@ -138,7 +138,7 @@ def retarget(tmp_path_factory):
         lines += [f"{n} {parent} {_row(p)} {_row(q)} {s}" for n, parent, p, q, s in made.skeleton.bones]
         lod = list(range(len(made.skeleton.bones))) if lod is None else lod
         lines += [str(len(lod)), " ".join(map(str, lod)), str(weight)]
-        (subject,) = json.loads(hand_json("a", side, joints)).values()
+        (subject,) = json.loads(hand_json(f"a_{side}", joints)).values()
         lines += [f"{b['Name']} {b['Parent']} {_row(b['Location'])} {_row(b['Rotation'])}" for b in subject]
         done = subprocess.run(
             [str(exe)], input="\n".join(lines) + "\n", capture_output=True, encoding="utf-8", timeout=60
