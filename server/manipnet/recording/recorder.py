@@ -14,6 +14,7 @@ from manipnet.common.file_names import is_device, is_encodable
 from manipnet.control.request import Handler, Request, RequestError
 from manipnet.recording.open_recording import OpenRecording, RecordingFailedError
 from manipnet.recording.take_names import NAME, free_path, safe_name, time_name
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 
 MIN_FREE_BYTES: Final = 64 << 20
@@ -24,7 +25,7 @@ About = Callable[[], tuple[dict[str, str], Sequence[Prop]]]
 
 
 class Recorder:
-    """Records in `folder`. `note` belongs to the tick thread, everything else to the control thread."""
+    """Records in `folder`. `note` and `note_avatar` belong to the tick thread, the requests to the control thread."""
 
     def __init__(self, folder: Path, about: About, telemetry: Telemetry) -> None:
         self._folder, self._about, self._telemetry = folder, about, telemetry
@@ -38,6 +39,17 @@ class Recorder:
         recording = self.current()
         if recording is not None:
             recording.note(payload)
+
+    def note_avatar(self, payload: bytes, profile: HandProfile) -> None:
+        """Record the hands message of an avatar, given as msgpack, if a recording is in progress; returns at once."""
+        recording = self._current()
+        if recording is not None:
+            recording.note_avatar(payload, profile)
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a recording is in progress. From any thread."""
+        return self._current() is not None
 
     def handlers(self) -> Mapping[str, Handler]:
         """One function per operation."""

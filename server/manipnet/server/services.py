@@ -59,7 +59,7 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
 
     emission = Emission(telemetry, session.bundle.hand, config.host, keys, session.given_avatars, submit)
     outputs = open_outputs(config.of, emission)
-    publisher = Publisher(outputs, telemetry, recorder.note)
+    publisher = Publisher(outputs, telemetry, recorder, session.given_avatars.values())
     opened.callback(publisher.close)
     session.avatars.audience = publisher
     meshes = MeshWatch(session.catalog, session.replace_shape)

@@ -21,6 +21,7 @@ from manipnet.control.request import Handler, Request
 from manipnet.control.session_requests import SessionRequests
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.jit import collection_paused
+from manipnet.recording.open_recording import profile_key
 from manipnet.recording.recorder import carried_objects
 from manipnet.runtime.avatars import avatars_of
 from manipnet.runtime.flight_recorder import FlightRecorder
@@ -122,7 +123,7 @@ class Session:
             "model": self.bundle.name,
             "model_hash": self.bundle.model_hash,
             "objects": carried_objects(props),
-            **{f"hand {profile.name}": profile_to_json(profile) for profile in profiles},
+            **{profile_key(profile.name): profile_to_json(profile) for profile in profiles},
         }
         if self.config.rig is not None:
             with suppress(OSError, UnicodeDecodeError):  # a rig file that is gone must not prevent a recording
