@@ -42,14 +42,14 @@ class Recorder:
 
     def note_avatar(self, payload: bytes, profile: HandProfile) -> None:
         """Record the hands message of an avatar, given as msgpack, if a recording is in progress; returns at once."""
-        recording = self._current()
+        recording = self.current()
         if recording is not None:
             recording.note_avatar(payload, profile)
 
     @property
     def is_recording(self) -> bool:
         """Whether a recording is in progress. From any thread."""
-        return self._current() is not None
+        return self.current() is not None
 
     def handlers(self) -> Mapping[str, Handler]:
         """One function per operation."""
