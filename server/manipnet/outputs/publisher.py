@@ -55,7 +55,6 @@ class Publisher:
     def publish(self, message: HandsMessage) -> None:
         """Send one message to everybody. Raises `MessageError` for a message that breaks the protocol's rules."""
         hands = EncodedHands(message)
-        _ = hands.binary  # checks the message before anybody gets it
         if self._tape is not None and self._tape.is_recording:
             self._tape.note(hands.msgpack)
         for declared, output in self._outputs.items():
