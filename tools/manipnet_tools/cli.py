@@ -26,6 +26,7 @@ class Verb:
 
 
 _OPTIONS = "manipnet_tools.commands.options"
+_COMPLETION = "manipnet_tools.commands.completion"
 VERBS = {
     "serve": Verb("synthesise fingers live from tracked wrists and props (same as manipnet-serve)", "manipnet.cli"),
     "replay": Verb(
@@ -126,10 +127,14 @@ VERBS = {
         ("manipnet-full --out models/manipnet-full-int8",),
     ),
     "bench": Verb(
-        "measure how long each stage of a tick takes",
+        "say whether this computer is fast enough, or measure each stage of a tick",
         "manipnet_tools.bench.command",
         "manipnet_tools.bench.options.BenchOptions",
-        ("--only tick --seconds 20", "--json figures.json"),
+        (
+            "                                is this computer fast enough?",
+            "--full --json figures.json      all stages, beside a reference (extra train)",
+            "--only tick --seconds 20",
+        ),
     ),
     "doctor": Verb(
         "find out why no tracked bodies arrive",
@@ -149,6 +154,7 @@ VERBS = {
         ),
     ),
     "keys": Verb("make and list the keys of clients that connect over the network", "manipnet_tools.commands.keys"),
+    "completion": Verb("print the script with which your shell completes verbs and options", _COMPLETION),
 }
 
 EXAMPLES = """examples:
