@@ -1,7 +1,7 @@
 """The walk of docs/first-day.md, followed to the letter: every command of it runs, in order, in an empty folder.
 
-Only the installation is left out, because the tests run on what is installed. So that the walk meets no other server, the
-server takes free ports, and the commands that talk to it name it.
+Only the installation is left out, because the tests run on what is installed. So that the walk meets no other server,
+the server takes free ports, and the commands that talk to it name it.
 """
 
 import csv
@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,11 @@ def program(word: str) -> list[str]:
     return [sys.executable, "-m", {"manipnet": "manipnet_tools.cli", "manipnet-serve": "manipnet.cli"}[word]]
 
 
+def forward(stream: Iterable[str], lines: "queue.Queue[str]") -> None:
+    for line in stream:
+        lines.put(line)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for another process")
 def test_the_walk_can_be_followed(tmp_path: Path) -> None:
@@ -49,7 +55,7 @@ def test_the_walk_can_be_followed(tmp_path: Path) -> None:
                 server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path, env=environment)
                 stdout = server.stdout
                 assert stdout is not None
-                threading.Thread(target=lambda: [lines.put(line) for line in stdout], daemon=True).start()
+                threading.Thread(target=forward, args=(stdout, lines), daemon=True).start()
                 words = lines.get(timeout=PATIENCE_S).split()
                 control = words[words.index("control") + 1]
                 while "bodies arrive" not in lines.get(timeout=PATIENCE_S):

@@ -142,7 +142,7 @@ def table(outcomes: Sequence[Outcome]) -> Table:
     lines.add_column("take", overflow="fold")
     lines.add_column("result", no_wrap=True)
     if any(outcome.reason for outcome in outcomes):
-        lines.add_column("reason", overflow="fold", ratio=1)
+        lines.add_column("reason", overflow="fold")
     for title in ("length", "took", "speed"):
         lines.add_column(title, justify="right", no_wrap=True)
     for outcome in outcomes:

@@ -57,7 +57,7 @@ def measure(bundle: Bundle, scenario: Scenario, seconds: float) -> Quick:
         actors_ms.append(1e3 * sum(several.tick().values()))
     p50_ms, p99_ms = np.percentile(ticks_ms, [50.0, 99.0])
     late_p99_ms, actors_p99_ms = np.percentile(late_ms, 99.0), np.percentile(actors_ms, 99.0)
-    return Quick(*(round(float(x), 3) for x in (p50_ms, p99_ms, late_p99_ms, actors_p99_ms)), seconds)
+    return Quick(float(p50_ms), float(p99_ms), float(late_p99_ms), float(actors_p99_ms), seconds)
 
 
 def _paced(runner: TickRunner, seconds: float) -> tuple[list[float], list[float]]:
