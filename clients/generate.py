@@ -11,6 +11,7 @@ import numpy as np
 
 from manipnet import __version__
 from manipnet.geometry import SIDES, Side, compose, invert, matrix_to_quat
+from manipnet.synthesis.hand.avatar import model_radii
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -56,6 +57,9 @@ _zero_joints = pose_in_world(
 _WRIST = OPENXR_JOINT_NAMES.index("wrist")
 REST_JOINTS = compose(invert(_zero_joints[[_WRIST] * len(_zero_joints)]), _zero_joints).round(8) + 0.0
 """OpenXR joints `(26, 7)` of a right hand with all angles zero, in the frame of its wrist joint."""
+
+REST_RADII = model_radii(shipped_hand()).round(6)
+"""Distance of the skin of that hand from each joint, `(26,)`, m."""
 
 NAMES = {
     "states": STATES,
@@ -105,9 +109,11 @@ def python_layout() -> str:
     for name, words in {**NAMES, "joint_parents": OPENXR_PARENTS}.items():
         body = "".join(f"    {json.dumps(word)},\n" for word in words)
         lines += [f"{name.upper()} = (\n{body})"]
-    for name, table in ZERO_POSE.items():
+    for name, table in {**ZERO_POSE, "rest_joints": REST_JOINTS}.items():
         body = "".join(f"        {json.dumps(row.tolist())},\n" for row in table)
         lines += [f"{name.upper()} = np.array(\n    [\n{body}    ]\n)"]
+    radii = "".join(f"        {radius},\n" for radius in REST_RADII.tolist())
+    lines += [f"REST_RADII = np.array(\n    [\n{radii}    ]\n)"]
     for record, dtype in {**RECORDS, "timed_header": TIMED_HEADER}.items():
         lines += ["", f"{record.upper()} = np.dtype(", "    {", f'        "itemsize": {dtype.itemsize},']
         fields = [(name, _python_format(kind), offset) for name, (kind, offset) in _fields(dtype).items()]
@@ -142,6 +148,9 @@ def csharp_layout() -> str:
     for name, table in ZERO_POSE.items():
         lines += [f"        public static readonly float[] {_pascal(name)} =", "        {"]
         lines += [f"            {', '.join(f'{x}f' for x in row)}," for row in table.tolist()] + ["        };"]
+    lines += ["        /// <summary>OpenXR joints of a straight right hand, in the frame of its wrist joint.</summary>"]
+    lines += ["        public static readonly float[] RestJoints =", "        {"]
+    lines += [f"            {', '.join(f'{x}f' for x in row)}," for row in REST_JOINTS.tolist()] + ["        };"]
     return "\n".join([*lines, "    }", "}"]) + "\n"
 
 
@@ -177,6 +186,12 @@ def cpp_rig_names() -> str:
         for bone in range(15):
             names = rig_names.finger_names(side, bone // 3, bone % 3)
             lines += [f'    {{"{name}", {number}, {bone}}},' for name in names]
+    lines += ["};", "", "/// The bones in the palm, counted by the four fingers."]
+    lines += ["inline constexpr Finger kMetacarpals[] = {"]
+    for number, side in enumerate(SIDES):
+        for finger in range(1, 5):
+            names = rig_names.metacarpal_names(side, finger)
+            lines += [f'    {{"{name}", {number}, {finger - 1}}},' for name in names]
     return "\n".join([*lines, "};", "", "}  // namespace manipnet::rig_names"]) + "\n"
 
 
@@ -196,6 +211,23 @@ def javascript_layout() -> str:
     webxr = [webxr_name(name) for name in OPENXR_JOINT_NAMES]
     for name, words in {**NAMES, "joint_names": webxr, "joint_parents": OPENXR_PARENTS}.items():
         lines += [f"export const {name.upper()} = {json.dumps(words)};"]
+    rows = "".join(f"  {json.dumps(row)},\n" for row in REST_JOINTS.tolist())
+    lines += [
+        f"export const REST_JOINTS = [\n{rows}];",
+        f"export const REST_RADII = {json.dumps(REST_RADII.tolist())};",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def javascript_rig_names() -> str:
+    """Names of bones in their plain form, of which the first that a rig has is taken."""
+    lines = [f"// {NOTE}"]
+    for name, table in _rig_tables().items():
+        rows = "".join(
+            f"  {side}: {json.dumps([t.split() for t in texts], ensure_ascii=False)},\n"
+            for side, texts in table.items()
+        )
+        lines += [f"export const {name.upper()} = {{\n{rows}}};"]
     return "\n".join(lines) + "\n"
 
 
@@ -231,6 +263,7 @@ def _rig_tables() -> dict[str, dict[Side, list[str]]]:
         "finger_bones": {side: bone_names(side) for side in SIDES},
         "hand_bones": {side: [" ".join(rig_names.hand_names(side))] for side in SIDES},
         "thumb_metacarpals": {side: [" ".join(rig_names.metacarpal_names(side, 0))] for side in SIDES},
+        "metacarpals": {side: [" ".join(rig_names.metacarpal_names(side, f)) for f in range(1, 5)] for side in SIDES},
     }
 
 
@@ -259,6 +292,7 @@ def files() -> dict[Path, str]:
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RestJoints.h": cpp_rest_joints(),
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RigNames.h": cpp_rig_names(),
         FOLDER / "web/layout.js": javascript_layout(),
+        FOLDER / "web/rig-names.js": javascript_rig_names(),
         **manifests(),
     }
 

@@ -15,7 +15,7 @@ from manipnet.inputs import INPUTS
 from manipnet.runtime.console import Console
 from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.runtime.status import SilenceWatch
-from manipnet.telemetry import DROP_REASONS, LABELS, Telemetry, Timings
+from manipnet.telemetry import DROP_REASONS, LABELS, Recent, RepeatFilter, Telemetry, Timings
 from manipnet.tracking.tick import BodyHealth
 from manipnet.wire.bodies import BodyFrame
 
@@ -91,6 +91,13 @@ def test_timings_keep_all_and_the_newest() -> None:
     assert timings.recent("total", 0.0, 100.0) == pytest.approx([0.901, 1.0])
     assert timings.recent("total", 50.0) == [0.0], "read once"
     assert timings.totals("total") == (1000, pytest.approx(500.5))
+
+
+def test_what_has_not_happened_for_long_does_not_happen_at_any_rate() -> None:
+    recent = Recent()
+    recent.note(96, 100.0)
+    assert recent.report(101.0)["rate_hz"] > 0.0
+    assert recent.report(110.0) == {"rate_hz": 0.0, "age_s": 10.0}
 
 
 def test_gauges_are_measured_when_they_are_read() -> None:

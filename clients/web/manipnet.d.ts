@@ -59,6 +59,8 @@ export class Interpolator {
 
 export interface ClientStats {
   state: string;
+  /** Why the server does not solve on the hand profile, or an empty text. */
+  problem: string;
   received: number;
   late: number;
   lost: number;
@@ -76,7 +78,46 @@ export interface SocketLike {
   onmessage: ((event: any) => void) | null;
   onclose: ((event: any) => void) | null;
   onerror: ((event: any) => void) | null;
+  send(text: string): void;
   close(): void;
+}
+
+/** A hand of a profile: 26 joints at rest (position in metres, quaternion) in the frame of the wrist joint, and radii. */
+export interface ProfileHand {
+  joints: (number[] | null)[];
+  radii?: (number | null)[];
+}
+
+/** A hand profile, as docs/any-hand.md describes it. */
+export interface HandProfile {
+  name: string;
+  left?: ProfileHand;
+  right?: ProfileHand;
+}
+
+export interface AvatarOptions {
+  /** The beginning of the profile's name in the server; the name of the object, if missing. */
+  name?: string;
+  /** A bone map: names that a known program gives to bones, and the names of this rig's bones. */
+  map?: Record<string, string>;
+  /** Which hand a rig is whose bones have WebXR's names. */
+  side?: Side | null;
+}
+
+/** What AvatarHands uses of an object of three.js, with its bones below it in their rest pose. */
+export interface RigObject {
+  name: string;
+  traverse(callback: (object: any) => void): void;
+  updateWorldMatrix(updateParents: boolean, updateChildren: boolean): void;
+}
+
+/** The hands of an avatar of three.js. Throws an Error that says why the server cannot solve on them. */
+export class AvatarHands {
+  constructor(root: RigObject, options?: AvatarOptions);
+  readonly profile: HandProfile;
+  readonly sides: Side[];
+  /** Poses the finger bones and, with `wrists`, moves the hands to their wrists. */
+  show(hands: HandsFrame, options?: { wrists?: boolean }): void;
 }
 
 export interface ClientOptions {
@@ -86,6 +127,8 @@ export interface ClientOptions {
   delayS?: number;
   /** The token of the server's --web-token. */
   token?: string | null;
+  /** The profile of the hands on which the server solves contact, such as that of AvatarHands. */
+  hand?: HandProfile | null;
   /** The class of the sockets, where there is no global WebSocket. */
   WebSocket?: new (address: string, protocols?: string[]) => SocketLike;
 }

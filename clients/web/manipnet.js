@@ -9,6 +9,7 @@ import { decode, HandsFrame } from "./frame.js";
 import { Interpolator } from "./interpolator.js";
 import { RATE_HZ } from "./layout.js";
 
+export { AvatarHands } from "./avatar.js";
 export { decode, HandsFrame } from "./frame.js";
 export { Interpolator } from "./interpolator.js";
 export { ANGLE_NAMES, BONE_NAMES, JOINT_NAMES, JOINT_PARENTS } from "./layout.js";
@@ -36,21 +37,27 @@ export class ManipNetClient {
   #seq = 0;
   #receivedMs = 0;
   #newestAt = -Infinity;
-  #counts = { state: "connecting", received: 0, lost: 0, refused: 0, connections: 0 };
+  #profile;
+  #counts = { state: "connecting", problem: "", received: 0, lost: 0, refused: 0, connections: 0 };
 
   /**
    * `address` is "ws://HOST:PORT" from the server's line `ready`, or "wss://…" behind a proxy with TLS. Throws an Error
    * for any other form. `token` is the one of the server's --web-token. `WebSocket` is the class of the sockets, for
-   * programs without one of their own, such as node before version 22.
+   * programs without one of their own, such as node before version 22. `hand` is a hand profile, such as that of
+   * AvatarHands, on which the server then solves contact; the profile is uploaded at each connection.
    */
-  constructor(address, { actor = null, delayS = 0.1, token = null, WebSocket = globalThis.WebSocket } = {}) {
+  constructor(
+    address,
+    { actor = null, delayS = 0.1, token = null, hand = null, WebSocket = globalThis.WebSocket } = {},
+  ) {
     if (!/^wss?:\/\/[^/]+/.test(address)) {
       throw new Error(`the address is "${address}"; allowed is ws://HOST:PORT, as in ws://127.0.0.1:8081`);
     }
     if (typeof WebSocket !== "function") {
       throw new Error("there is no WebSocket here; pass one, as in new ManipNetClient(address, { WebSocket })");
     }
-    this.#address = address;
+    this.#profile = hand;
+    this.#address = hand === null ? address : `${address.replace(/\/$/, "")}/hand/${encodeURIComponent(hand.name)}`;
     this.#protocols = token === null ? [] : [SUBPROTOCOL, `${SUBPROTOCOL}.token.${token}`];
     this.#WebSocket = WebSocket;
     this.#actor = actor;
@@ -74,7 +81,7 @@ export class ManipNetClient {
     return this.#interpolator.sample(nowS);
   }
 
-  /** The state and the counters: received, late, lost, refused, connections, seq (of the newest), rateHz, ageS. */
+  /** The state, the problem with the hand profile (or ""), and the counters: received, late, lost, refused, connections, seq (of the newest), rateHz, ageS. */
   stats() {
     const now = performance.now() / 1000;
     const known = this.#arrivals.subarray(0, Math.min(this.#counts.received, RATE_HZ));
@@ -100,12 +107,26 @@ export class ManipNetClient {
       this.#receivedMs = performance.now();
       this.#counts.connections++;
       this.#counts.state = "connected";
+      if (this.#profile !== null) socket.send(JSON.stringify(this.#upload()));
     };
-    socket.onmessage = (event) => {
-      if (socket === this.#socket) this.#take(event.data, performance.now() / 1000);
+    socket.onmessage = ({ data }) => {
+      if (socket !== this.#socket) return;
+      if (typeof data === "string") this.#takeAnswer(data);
+      else this.#take(data, performance.now() / 1000);
     };
     socket.onclose = socket.onerror = () => this.#retry(socket);
     this.#socket = socket;
+  }
+
+  #upload() {
+    return { op: "hand_profile", profile: this.#profile, ...(this.#actor === null ? {} : { actor: this.#actor }) };
+  }
+
+  /** The server's answer to the profile, which says why the server refuses it, if it does. */
+  #takeAnswer(text) {
+    this.#receivedMs = performance.now();
+    const { error } = JSON.parse(text);
+    this.#counts.problem = error === undefined ? "" : `the server refuses the hand profile: ${error}`;
   }
 
   #retry(socket) {

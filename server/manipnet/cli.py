@@ -32,6 +32,7 @@ from manipnet.config.settings import (
 )
 from manipnet.runtime.memory import check_address_space, share_arenas
 from manipnet.runtime.start_progress import StartProgress
+from manipnet.synthesis.hand.shipped_files import hand_file
 from manipnet.synthesis.model.shipped import BundleError, version_text
 
 if TYPE_CHECKING:
@@ -68,9 +69,9 @@ def build_parser() -> Parser:
     )
     tracked.add_argument(
         "--hand",
-        type=Path,
+        type=hand_file,
         metavar="HAND.json",
-        help="also solve the first actor's hands on this avatar's hand; see docs/any-hand.md",
+        help="also solve the first actor's hands on this avatar's hand, or on a shipped one: generic, adult or child",
     )
     tracked.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="override a key of the rig file; repeatable"

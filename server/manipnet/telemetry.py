@@ -187,8 +187,9 @@ class Recent:
     def report(self, now_s: float) -> dict[str, float]:
         """`rate_hz` and `age_s`."""
         passed_s = now_s - self._since_s
+        age_s = max(now_s - self._newest_s, 0.0)
         rate_hz = self._count / passed_s if passed_s > 0.25 * self.PERIOD_S else self._before_hz or self._count
-        return {"rate_hz": rate_hz, "age_s": max(now_s - self._newest_s, 0.0)}
+        return {"rate_hz": rate_hz if age_s <= self.PERIOD_S else 0.0, "age_s": age_s}
 
 
 class Timings:

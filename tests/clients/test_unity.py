@@ -45,15 +45,8 @@ def test_assemblies():
 
 
 @pytest.fixture(scope="module")
-def glue(tmp_path_factory):
-    mcs, mono = need("mcs", "mono")
-    exe = tmp_path_factory.mktemp("glue") / "glue.exe"
-    own = [CSHARP / "Glue.cs", CSHARP / "Features.cs", *sorted((CSHARP / "stubs").glob("*.cs"))]
-    sources = [*sorted(PACKAGE.rglob("*.cs")), *own]
-    # 649: Unity assigns fields by itself. 67 and 414: the stubs' attributes and events are not used.
-    options = ["-langversion:7.2", "-warn:4", "-warnaserror", "-nowarn:649,67,414", "-r:System.Core", f"-out:{exe}"]
-    subprocess.run([mcs, *options, *map(str, sources)], check=True)
-    return [mono, str(exe)]
+def glue(harness):
+    return harness("unity")
 
 
 def test_core_uses_no_engine_type():

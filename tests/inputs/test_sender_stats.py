@@ -50,6 +50,16 @@ def test_the_rate_of_each_body_is_known(senders, rate_hz, seconds):
     assert first["tracked"] == pytest.approx(0.5, abs=0.5 / rate_hz + 0.1)
 
 
+def test_what_has_been_silent_for_longer_than_a_second_has_no_rate(senders):
+    body = BodySample(1, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True)
+    for frame in frames(120, 3.0):
+        senders(frame._replace(bodies=(body,)))
+    for silent_s, rate_hz in ((0.5, 120.0), (1.1, 0.0), (530.0, 0.0)):
+        (sender,) = senders.report(3.0 + silent_s).values()
+        assert sender["rate_hz"] == sender["bodies"][0]["rate_hz"] == pytest.approx(rate_hz)
+        assert sender["age_s"] == sender["bodies"][0]["age_s"] == pytest.approx(silent_s + 1 / 120)
+
+
 def test_what_arrives_in_one_burst_at_first_tells_no_rate(senders):
     body = BodySample(1, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True)
     waited = [BodyFrame(n / 100 - 2.0, n, (body,), 2e-5 * n, "zmq:a") for n in range(200)]

@@ -13,6 +13,7 @@ from fake_motive import FakeMotive
 from live_server import PATIENCE_S
 from natnet_writer import Frame
 from osc_writer import bundle, osc
+from publisher import message
 
 from manipnet.control.dispatcher import Dispatcher
 from manipnet.control.service import Control
@@ -176,10 +177,10 @@ def test_a_request_whose_handling_fails_costs_only_itself(telemetry):
     dispatcher = Dispatcher({"ping": lambda _: {"t": 1.0}}, telemetry)
     submit = dispatcher.submit
 
-    def fussy(parts, reply, here=True):
+    def fussy(parts, reply, here=True, ops=("ping",)):
         if b"bad" in parts[0]:
             raise RuntimeError("digest")
-        submit(parts, reply, here)
+        submit(parts, reply, here, ops)
 
     dispatcher.submit = fussy
     control = Control("127.0.0.1", 0, dispatcher, telemetry)
@@ -199,7 +200,7 @@ def test_a_request_whose_handling_fails_costs_only_itself(telemetry):
 
 def test_hands_are_published_again_after_the_socket_has_failed(telemetry):
     publisher = ZmqPublisher(telemetry, "127.0.0.1", 0)
-    hands = EncodedHands(None, b"m", b"b")  # pyright: ignore[reportArgumentType]
+    hands = EncodedHands(message(0, 0.0, 0.1))
     try:
         end_context(publisher._bound)
         wait_for(lambda: not publisher.send(hands))
@@ -209,7 +210,7 @@ def test_hands_are_published_again_after_the_socket_has_failed(telemetry):
             client.subscribe(TOPIC_BIN)
             client.connect(str(publisher.address))
             wait_for(lambda: publisher.send(hands) and client.poll(0))
-            assert client.recv() == TOPIC_BIN + b"b"
+            assert client.recv() == TOPIC_BIN + hands.binary
     finally:
         publisher.close()
 

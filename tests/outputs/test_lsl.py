@@ -54,11 +54,11 @@ def sender():
 def test_hands_bodies_and_events_are_read_back(sender):
     actor = "reader-of-streams"
     message = replace(LIVE, actor=actor, session="lsl")
-    sender.send(EncodedHands(message, b"", b""))
+    sender.send(EncodedHands(message))
     hands, bodies, events = (inlet(f"ManipNet {actor} {what}") for what in ("hands", "bodies", "events"))
     one_handed = replace(message, hands={"right": LIVE.hands["right"]})
     before_s = pylsl.local_clock()
-    assert sender.send(EncodedHands(one_handed, b"", b""))
+    assert sender.send(EncodedHands(one_handed))
     after_s = pylsl.local_clock()
 
     sample, at_s = pulled(hands)
@@ -79,7 +79,7 @@ def test_hands_bodies_and_events_are_read_back(sender):
 
 def test_other_bodies_begin_another_stream(sender):
     message = replace(LIVE, actor="other-bodies")
-    sender.send(EncodedHands(message, b"", b""))
+    sender.send(EncodedHands(message))
     assert len(labels(inlet("ManipNet other-bodies bodies"))) == 21
-    sender.send(EncodedHands(replace(message, bodies=LIVE.bodies[:1]), b"", b""))
+    sender.send(EncodedHands(replace(message, bodies=LIVE.bodies[:1])))
     assert len(labels(inlet("ManipNet other-bodies bodies"))) == 7

@@ -130,7 +130,7 @@ def received(*messages, **options):
         receiver.bind(("127.0.0.1", 0))
         receiver.setblocking(False)
         sender = VmcSender("127.0.0.1", receiver.getsockname()[1], HAND, **options)
-        sent = [sender.send(EncodedHands(message, b"", b"")) for message in messages]
+        sent = [sender.send(EncodedHands(message)) for message in messages]
         sender.close()
         datagrams = []
         with contextlib.suppress(BlockingIOError):
@@ -177,7 +177,7 @@ def test_read_by_an_independent_osc_tool():
     try:
         text, give_up = b"", time.monotonic() + 20
         while text.count(b"/VMC/Ext/Bone/Pos") < 32 and time.monotonic() < give_up:
-            sender.send(EncodedHands(message, b"", b""))  # again and again: the tool does not tell when it listens
+            sender.send(EncodedHands(message))  # again and again: the tool does not tell when it listens
             while select.select([process.stdout], [], [], 0.05)[0]:
                 text += process.stdout.read1(65536)
     finally:

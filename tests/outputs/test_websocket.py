@@ -1,7 +1,9 @@
 """Hands over WebSocket: every payload arrives, slow clients get the newest, pages of other sites are refused."""
 
+import json
 import os
 import socket
+import time
 from contextlib import ExitStack
 
 import pytest
@@ -11,7 +13,8 @@ from websockets.typing import Origin, Subprotocol
 
 from manipnet.common.options import ConfigError
 from manipnet.net.half_open import MOST_HALF_OPEN
-from manipnet.outputs.websocket.server import MAX_CLIENTS, MAX_REQUESTS, WebSocketPublisher
+from manipnet.outputs.websocket.client import MAX_REQUESTS, MINUTE_S, Client, avatar_of
+from manipnet.outputs.websocket.server import MAX_CLIENTS, WebSocketPublisher
 from manipnet.outputs.websocket.token import read_token
 from manipnet.telemetry import Telemetry
 
@@ -36,6 +39,13 @@ def receive(publisher, connection, payload):
             return connection.recv(timeout=0.1)
         except TimeoutError:
             continue
+
+
+def wait_until(is_so):
+    give_up_s = time.monotonic() + 20.0
+    while not is_so():
+        assert time.monotonic() < give_up_s
+        time.sleep(0.01)
 
 
 def test_payloads_arrive_in_order(publisher):
@@ -106,15 +116,60 @@ def test_the_number_of_clients_is_limited_and_refusals_are_counted(publisher, te
 
 def test_a_client_that_keeps_sending_is_cut_off(publisher, telemetry):
     with connect(publisher.address) as connection:
-        connection.send(b"x" * 2000)
+        connection.send("x" * 70_000)
         with pytest.raises(ConnectionClosed, match="1009"):
             connection.recv(timeout=10)
     with connect(publisher.address) as connection:
         for _ in range(MAX_REQUESTS):
-            connection.send(b"x")
-        with pytest.raises(ConnectionClosed, match="clients must not send anything"):
+            connection.send("x")
+            assert "must be a text message with a JSON map" in json.loads(connection.recv(timeout=10))["error"]
+        connection.send("x")
+        with pytest.raises(ConnectionClosed, match="at most 16 requests a minute"):
             connection.recv(timeout=10)
     assert telemetry.counts() == {"connections_refused": {"endless": 1}}
+
+
+def test_a_client_at_the_path_of_an_avatar_receives_only_its_hands(publisher):
+    with connect(f"{publisher.address}/hand/long") as avatar, connect(publisher.address) as model:
+        wait_until(lambda: publisher.connected() == 2)
+        assert publisher.wants("long")
+        assert not publisher.wants("other")
+        for payload, name in ((b"model", None), (b"other", "other"), (b"avatar", "long"), (b"model again", None)):
+            publisher.publish(payload, name)
+        assert avatar.recv(timeout=10) == b"avatar"
+        assert [model.recv(timeout=10) for _ in range(2)] == [b"model", b"model again"]
+        with pytest.raises(TimeoutError):
+            avatar.recv(timeout=0.1)
+    wait_until(lambda: not publisher.wants("long"))
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("/", None),
+        ("/anything/hand/x", None),
+        ("//[", None),
+        ("/hand/long?x=1", "long"),
+        ("/hand/h%C3%A4nde", "hände"),
+        ("/hand/a%2Fb", "a/b"),
+        ("/hand/%FF", "\ufffd"),
+    ],
+)
+def test_the_path_names_the_avatar(path, name):
+    assert avatar_of(path) == name
+
+
+def test_a_path_without_a_name_is_refused(publisher):
+    with pytest.raises(InvalidStatus, match="404"):
+        connect(f"{publisher.address}/hand/")
+
+
+def test_a_client_may_send_requests_again_after_a_minute():
+    client = Client(None)
+    assert all(client.may_ask(0.0) for _ in range(MAX_REQUESTS))
+    assert not client.may_ask(MINUTE_S - 1.0)
+    client = Client(None)
+    assert all(client.may_ask(10.0 * n) for n in range(100))
 
 
 def test_a_port_in_use_is_an_error(publisher):

@@ -1,7 +1,9 @@
 """Hands solved on avatars, by a real server: upload, topics, limits of number, a rig's own profile."""
 
 import json
+import socket
 import time
+from contextlib import ExitStack
 
 import msgpack
 import numpy as np
@@ -9,6 +11,9 @@ import pytest
 import zmq
 from avatar_profiles import as_content, scaled_profile
 from live_server import serving
+from pythonosc.osc_bundle import OscBundle
+from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from manipnet.actors.avatar import Avatar
 from manipnet.runtime.avatars import FORGET_AFTER_S, MAX_PROFILES, Avatars, TooManyProfilesError
@@ -22,10 +27,23 @@ LONG, SMALL = scaled_profile(MODEL, 1.15, name="long"), scaled_profile(MODEL, wh
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory):
+def receivers():
+    """The programs that the server sends hands to, by its options."""
+    with ExitStack() as opened:
+        sockets = {}
+        for option in ("--vmc", "--livelink"):
+            sockets[option] = opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            sockets[option].bind(("127.0.0.1", 0))
+            sockets[option].settimeout(20.0)
+        yield sockets
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, receivers):
     file = tmp_path_factory.mktemp("hand") / "small.json"
     file.write_text(profile_to_json(SMALL), encoding="utf-8")
-    with serving("--demo", "--hand", str(file)) as server:
+    to = [f"{option}=127.0.0.1:{receiver.getsockname()[1]}" for option, receiver in receivers.items()]
+    with serving("--demo", "--hand", str(file), *to) as server:
         yield server
 
 
@@ -78,6 +96,19 @@ def test_the_hand_of_the_command_line_is_there_from_the_start(server):
     assert len(found["hand/small/bin"]) > 30
 
 
+def test_programs_that_show_avatars_get_the_hand_of_the_command_line(server, receivers):
+    subjects = {next(iter(json.loads(receivers["--livelink"].recv(65536)))) for _ in range(60)}
+    assert {"ManipNet_actor_small_left", "ManipNet_actor_right"} <= subjects
+    bundle = OscBundle(receivers["--vmc"].recv(4096))
+    bones = {m.params[0]: m.params[1:] for m in bundle if m.address == "/VMC/Ext/Bone/Pos"}
+    side = "left" if "LeftHand" in bones else "right"
+    rest = SMALL.hands[side].joints
+    for name, a, b in (("IndexProximal", 1, 7), ("IndexDistal", 8, 9), ("ThumbIntermediate", 2, 3)):
+        length = np.linalg.norm(bones[f"{side.capitalize()}{name}"][:3])
+        assert length == pytest.approx(np.linalg.norm(rest[b, :3] - rest[a, :3]), abs=1e-5)
+    assert server.ask({"op": "status"})["counters"]["messages_out"]["vmc"] > 0
+
+
 @pytest.mark.parametrize(
     ("request_", "reason"),
     [
@@ -101,7 +132,7 @@ class Audience:
     def wants(self, avatar):
         return avatar in self.wanted
 
-    def publish_avatar(self, message):
+    def publish_avatar(self, message, profile):
         raise AssertionError
 
 
@@ -141,6 +172,42 @@ def test_a_wrong_hand_file_stops_the_start(tmp_path):
     server = LiveServer("--demo", "--hand", str(file))
     assert server.process.wait(120) == 1
     assert "has neither a left nor a right hand" in "".join(server.errors)
+
+
+def uploaded(connection, request):
+    return answered(connection, json.dumps(request))
+
+
+def answered(connection, message):
+    """The answer to a message over WebSocket, whose text comes among binary payloads."""
+    connection.send(message)
+    while isinstance(answer := connection.recv(timeout=20), bytes):
+        pass
+    return json.loads(answer)
+
+
+def test_a_browser_uploads_its_hand_and_receives_it_over_one_websocket(server):
+    profile = scaled_profile(MODEL, 1.1, name="bröwser")
+    with connect(f"{server.addresses['web']}/hand/br%C3%B6wser", origin=Origin("http://localhost:8000")) as connection:
+        answer = uploaded(connection, {"op": "hand_profile", **as_content(profile)})
+        assert (answer["name"], answer["topics"][1]) == ("bröwser", "hand/bröwser/bin")
+        hand = decode_binary(connection.recv(timeout=20, decode=False)).hands["left"]
+        rest = profile.hands["left"].joints
+        for a, b in ((7, 8), (8, 9), (3, 4)):
+            assert np.linalg.norm(hand.joints[b, :3] - hand.joints[a, :3]) == pytest.approx(
+                np.linalg.norm(rest[b, :3] - rest[a, :3]), abs=1e-5
+            )
+
+
+def test_a_bad_upload_over_websocket_costs_only_itself(server):
+    with connect(f"{server.addresses['web']}/hand/small") as connection:
+        assert "allowed is hand_profile" in uploaded(connection, {"op": "rest"})["error"]
+        assert "neither a left nor a right" in uploaded(connection, {"op": "hand_profile", "name": "x"})["error"]
+        assert "neither a msgpack nor a JSON map" in answered(connection, '{"a":' * 10_000)["error"]
+        assert "must be a text message" in answered(connection, b"\x81\xa2op\xachand_profile")["error"]
+        for _ in range(60):
+            assert connection.recv(timeout=20)
+    assert server.ask({"op": "ping"})["t"] > 0
 
 
 def test_the_python_client_uploads_and_receives(server):

@@ -82,6 +82,8 @@ def test_natnet_to_hands(server, motive):
     assert 'manipnet_clock_offset_seconds{clock="natnet"}' in text
     assert 'manipnet_clock_uncertainty_seconds{clock="natnet"}' in text
     assert 'manipnet_connections{socket="hands"}' in text
+    assert 'manipnet_body_rate_hz{body="actor/Box"}' in text
+    assert 'manipnet_body_age_seconds{body="actor/left_wrist"}' in text
 
 
 def test_osc_to_hands(server):

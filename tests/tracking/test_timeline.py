@@ -33,6 +33,16 @@ def same_pose(a: Array, b: Array, tolerance: float = 1e-9) -> bool:
     )
 
 
+def test_a_body_of_which_nothing_comes_any_more_has_no_rate() -> None:
+    timeline = Timeline(0.1)
+    for k in range(240):
+        timeline.push(k / 120, {"body": screw(k / 120)}, k / 120)
+    last_s = 239 / 120
+    assert timeline.health(last_s)["body"].rate_hz == pytest.approx(120.0)
+    silent = timeline.health(last_s + 530.0)["body"]
+    assert (silent.rate_hz, silent.age_s) == (0.0, pytest.approx(530.0))
+
+
 def drain(timeline: Timeline, now_s: float) -> list[Tick]:
     ticks = []
     while (tick := timeline.poll(now_s)) is not None:

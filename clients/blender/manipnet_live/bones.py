@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 
-from .manipnet_client.retarget import FINGERS, PARTS, is_hand, is_thumb_metacarpal, matches
+from .manipnet_client.retarget import FINGERS, PARTS, is_hand, is_metacarpal, is_thumb_metacarpal, matches
 
 SIDES = ("left", "right")
 FINGER_PARTS = tuple(finger + part for finger in FINGERS for part in PARTS)
@@ -30,6 +30,8 @@ class HandBones:
     fingers: tuple[str | None, ...]
     control: str | None
     """The bone that moves the hand where a rig has such a control, as Rigify's `hand_ik.L`."""
+    metacarpals: tuple[str | None, ...]
+    """The bones in the palm that lead to the four fingers."""
 
     @property
     def missing(self) -> list[str]:
@@ -52,7 +54,7 @@ def find_hand(armature: bpy.types.Object, side: str, bone_map: Mapping[str, str]
     if hand is None or len(knuckles) - knuckles.count(None) < 2:
         missing = [part for part in ("Hand", *FINGER_PARTS) if found.get(part) is None]
         raise RigError(f"{armature.name} has no bone for {', '.join(missing)} of the {side} hand")
-    return HandBones(hand, fingers, _control(armature, side))
+    return HandBones(hand, fingers, _control(armature, side), _metacarpals(armature, side))
 
 
 def found_parts(armature: bpy.types.Object, side: str) -> dict[str, str]:
@@ -105,6 +107,12 @@ def write_bone_map(path: Path, bone_map: Mapping[str, str]) -> None:
 def _is_driven(bone_name: str) -> tuple[bool, bool]:
     """Rigify's deforming bones follow its controls, and so do those of Auto-Rig Pro, whose controls begin with c_."""
     return bone_name.startswith("DEF-"), not bone_name.startswith("c_")
+
+
+def _metacarpals(armature: bpy.types.Object, side: str) -> tuple[str | None, ...]:
+    names = [bone.name for bone in armature.data.bones]
+    fingers = range(1, len(FINGERS))
+    return tuple(next((name for name in names if is_metacarpal(name, side, finger)), None) for finger in fingers)
 
 
 def _control(armature: bpy.types.Object, side: str) -> str | None:

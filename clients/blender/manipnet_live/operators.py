@@ -18,9 +18,8 @@ class MANIPNET_OT_connect(bpy.types.Operator):  # noqa: N801  (Blender requires 
 
     def execute(self, context):
         chosen = context.scene.manipnet
-        control_address = chosen.control_address if chosen.show_props else ""
         try:
-            session.start(chosen.address, chosen.delay, chosen.cast(), control_address)
+            session.start(chosen.address, chosen.delay, chosen.cast(), chosen.control_address, chosen.show_props)
         except (ValueError, RigError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -18,10 +18,8 @@ class MANIPNET_PT_panel(bpy.types.Panel):  # noqa: N801  (Blender requires such 
         layout, chosen = self.layout, context.scene.manipnet
         settings = layout.column()
         settings.enabled = not session.is_running
-        for name in ("address", "delay", "show_props"):
+        for name in ("address", "control_address", "delay", "show_props"):
             settings.prop(chosen, name)
-        if chosen.show_props:
-            settings.prop(chosen, "control_address")
         for index, character in enumerate(chosen.characters):
             _draw_character(settings.box(), index, character)
         settings.operator("manipnet.add_character", icon="ADD")
@@ -39,10 +37,11 @@ def _draw_character(box, index: int, character) -> None:
     row = box.row()
     row.prop(character, "actor")
     row.operator("manipnet.remove_character", text="", icon="X").index = index
-    for name in ("armature", "follow_wrists"):
-        box.prop(character, name)
+    box.prop(character, "armature")
     if character.armature is None:
         return
+    for name in ("follow_wrists", "solve_on_avatar"):
+        box.prop(character, name)
     box.prop(character, "show_bones", icon="TRIA_DOWN" if character.show_bones else "TRIA_RIGHT")
     if character.show_bones:
         row = box.row()

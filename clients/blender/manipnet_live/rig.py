@@ -9,12 +9,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
-from .axes import quaternion, to_blender, turned_to_blender, xyzw
-from .bones import HandBones, find_hand
+from .axes import quaternion, to_blender, turned_to_blender
+from .bones import HandBones, RigError, find_hand
 from .manipnet_client import Hand
+from .manipnet_client.avatar import AvatarError, AvatarHand
 from .manipnet_client.layout import JOINT_NAMES
-from .manipnet_client.retarget import HandRig, rotate
+from .manipnet_client.retarget import HandRig
 from .recording import Track
+from .rest import bind_pose, rig_hand
 from .scene import Reference, own_object, rotate_to, rotation_of
 from .wrist import local_pose, wrist_for
 
@@ -32,13 +34,20 @@ class _FingerBone:
 
 
 class ArmatureHand:
-    """One hand of an armature. With any rest pose, its bones point where the synthesised ones do."""
+    """One hand of an armature. With any rest pose, its bones point where the synthesised ones do.
 
-    def __init__(self, armature: bpy.types.Object, side: str, wrist: bool, bone_map: Mapping[str, str]) -> None:
-        """Raises `RigError` if the armature lacks the hand, or two fingers of it."""
+    If the server solves on this `avatar`, the bones lie where the message for it says.
+    """
+
+    def __init__(
+        self, armature: bpy.types.Object, side: str, wrist: bool, bone_map: Mapping[str, str], avatar: bool = False
+    ) -> None:
+        """Raises `RigError` if the armature lacks the hand or two fingers of it, or cannot be solved on."""
         self.bones = find_hand(armature, side, bone_map)
         self._armature = Reference(armature)
-        self._rig = HandRig(side, *_bind_pose(armature, self.bones))
+        self.avatar = _avatar_hand(armature, side, self.bones) if avatar else None
+        """The hand on which the server solves, if it does."""
+        self._rig = self.avatar or HandRig(side, *bind_pose(armature, self.bones))
         self._fingers = _finger_bones(armature, self.bones)
         self._wrist = wrist_for(armature, side, self.bones) if wrist else None
         self._wanted: Vector | None = None
@@ -92,7 +101,8 @@ class ArmatureHand:
     def _wanted_pose(self, armature: bpy.types.Object, hand: Hand) -> Matrix:
         """The pose of the hand bone at the tracked wrist, in the armature's space and without its scale."""
         to_armature = armature.matrix_world.inverted()
-        place = to_armature @ Vector(to_blender(hand.wrist)[:3])
+        x, y, z = self._rig.hand_place(hand)
+        place = to_armature @ Vector((x, -z, y))
         turned = quaternion(turned_to_blender(self._rig.hand_rotation(hand)))
         return Matrix.LocRotScale(place, to_armature.to_quaternion() @ turned, None)
 
@@ -142,18 +152,11 @@ class JointEmpties:
             rotate_to(found, quaternion(pose[3:]))
 
 
-def _bind_pose(armature: bpy.types.Object, bones: HandBones) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The rest pose of the finger bones in the space of the hand bone, with NaN for a missing bone."""
-    hand = armature.data.bones[bones.hand]
-    to_hand, origin = xyzw(hand.matrix_local.inverted().to_quaternion()), np.array(hand.head_local)
-    positions, rotations, tips = np.full((15, 3), np.nan), np.full((15, 4), np.nan), np.full((5, 3), np.nan)
-    for row, name in enumerate(bones.fingers):
-        if name is not None:
-            bone = armature.data.bones[name]
-            positions[row] = rotate(to_hand, np.array(bone.head_local) - origin)
-            tips[row // 3] = rotate(to_hand, np.array(bone.tail_local) - origin)
-            rotations[row] = xyzw((hand.matrix_local.inverted() @ bone.matrix_local).to_quaternion())
-    return positions, rotations, tips
+def _avatar_hand(armature: bpy.types.Object, side: str, bones: HandBones) -> AvatarHand:
+    try:
+        return AvatarHand(side, rig_hand(armature, bones))
+    except AvatarError as error:
+        raise RigError(f"the server cannot solve on {armature.name}: {error}") from None
 
 
 def _finger_bones(armature: bpy.types.Object, bones: HandBones) -> list[_FingerBone]:

@@ -16,6 +16,7 @@ from .timecode import timecode_frames
 
 SHOW_EVERY_S = 1.0 / 60.0
 REDRAW_EVERY_S = 0.25
+CONTROL = "tcp://127.0.0.1:5557"
 
 
 class Session:
@@ -59,8 +60,10 @@ class Session:
         """The statistics of the first character."""
         return self.characters[0].stats() if self.characters else Stats(state="off")
 
-    def start(self, address: str, delay_s: float, cast: Sequence[Cast], control_address: str = "") -> None:
-        """Connect and show the cast, and props if there is a `control_address` for their meshes.
+    def start(
+        self, address: str, delay_s: float, cast: Sequence[Cast], control_address: str = CONTROL, props: bool = False
+    ) -> None:
+        """Connect and show the cast, and the tracked bodies with their meshes if `props` are wanted.
 
         Raises `ValueError` for a wrong address and `RigError` for an unknown rig. Then nothing has been started.
         """
@@ -70,8 +73,8 @@ class Session:
         started: list[Character] = []
         try:
             for each in cast or (Cast(),):
-                started.append(Character(address, delay_s, each))
-            self._props = Props(control_address) if control_address else None
+                started.append(Character(address, control_address, delay_s, each))
+            self._props = Props(control_address) if props else None
         except ValueError:
             for character in started:
                 character.close()

@@ -4,6 +4,7 @@ import bpy
 
 from .bones import ALL_PARTS
 from .character import Cast
+from .session import CONTROL
 
 
 class ManipNetBone(bpy.types.PropertyGroup):
@@ -26,6 +27,10 @@ class ManipNetCharacter(bpy.types.PropertyGroup):
     )
     follow_wrists: bpy.props.BoolProperty(
         name="Follow wrists", description="Also bring the hands to the tracked wrists"
+    )
+    solve_on_avatar: bpy.props.BoolProperty(
+        name="Solve on this avatar",
+        description="Let the server solve contact on the hands of this armature, so that what touches still touches",
     )
     show_bones: bpy.props.BoolProperty(name="Bones", description="Choose the bones of the hands by hand")
     bones: bpy.props.CollectionProperty(type=ManipNetBone)
@@ -50,8 +55,8 @@ class Settings(bpy.types.PropertyGroup):
     )
     control_address: bpy.props.StringProperty(
         name="Control",
-        default="tcp://127.0.0.1:5557",
-        description="Address for control in the server's line `ready`, where the meshes of props come from",
+        default=CONTROL,
+        description="Address for control in the server's line `ready`, for the meshes of props, avatars and requests",
     )
     delay: bpy.props.FloatProperty(
         name="Delay",
@@ -80,7 +85,10 @@ class Settings(bpy.types.PropertyGroup):
 
     def cast(self) -> list[Cast]:
         """The characters of the scene."""
-        return [Cast(each.actor, each.armature, each.follow_wrists, each.bone_map()) for each in self.characters]
+        return [
+            Cast(each.actor, each.armature, each.follow_wrists, each.bone_map(), each.solve_on_avatar)
+            for each in self.characters
+        ]
 
 
 GROUPS = (ManipNetBone, ManipNetCharacter, Settings)

@@ -6,25 +6,32 @@ import asyncio
 from collections.abc import AsyncGenerator, Generator
 from os import PathLike
 
+from .avatar import AvatarError, AvatarHand, RigHand, avatar_profile
 from .client import Client, Stats
 from .control import ControlClient, RequestError
 from .interpolation import Interpolator, Shown
 from .message import Body, Hand, Hands, MessageError, decode
+from .upload import HandUpload
 from .zmtp import parse_address
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AvatarError",
+    "AvatarHand",
     "Body",
     "Client",
     "ControlClient",
     "Hand",
+    "HandUpload",
     "Hands",
     "Interpolator",
     "MessageError",
     "RequestError",
+    "RigHand",
     "Shown",
     "Stats",
+    "avatar_profile",
     "decode",
     "subscribe",
     "subscribe_async",

@@ -11,7 +11,7 @@ import numpy as np
 
 from .layout import ZERO_POSITIONS, ZERO_ROTATIONS
 from .message import Hand
-from .rig_names import FINGER_BONES, HAND_BONES, THUMB_METACARPALS
+from .rig_names import FINGER_BONES, HAND_BONES, METACARPALS, THUMB_METACARPALS
 
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
 PARTS = ("Proximal", "Intermediate", "Distal")
@@ -53,6 +53,10 @@ class HandRig:
             back = multiply(conjugate(zero_q[BONES[i]]), conjugate(self.wrist_to_hand))
             self._bind[i] = multiply(back, turned)
 
+    def hand_place(self, hand: Hand) -> np.ndarray:
+        """Where the rig's hand bone is in the world, `(3,)`."""
+        return hand.wrist[:3]
+
     def hand_rotation(self, hand: Hand) -> np.ndarray:
         """The world rotation `(4,)` of the rig's hand bone that follows the tracked wrist."""
         return multiply(hand.wrist[3:], conjugate(self.wrist_to_hand))
@@ -86,6 +90,11 @@ def matches(bone: str, side: str, finger: int, part: int, thumb_metacarpal: bool
 def is_thumb_metacarpal(bone: str, side: str) -> bool:
     """Whether the name `bone` means the first bone of a thumb, as in VRM 1 and Godot."""
     return _plain(bone) in THUMB_METACARPALS[side][0].split()
+
+
+def is_metacarpal(bone: str, side: str, finger: int) -> bool:
+    """Whether the name `bone` means the bone in the palm that leads to a finger, counted from zero for the thumb."""
+    return finger > 0 and _plain(bone) in METACARPALS[side][finger - 1].split()
 
 
 def is_hand(bone: str, side: str) -> bool:

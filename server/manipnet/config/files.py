@@ -5,6 +5,7 @@ from pathlib import Path
 
 from manipnet.common.options import ConfigError
 from manipnet.config.settings import ServerConfig
+from manipnet.synthesis.hand.shipped_files import NAMES, hand_file
 from manipnet.synthesis.model.shipped import find_bundle
 from manipnet.synthesis.objects.library import library_names
 
@@ -13,9 +14,20 @@ def check_files(config: ServerConfig) -> None:
     """Raise `ConfigError` unless the meshes can be opened, and `BundleError` unless the model exists."""
     find_bundle(config.model)
     for actor in config.actors:
-        require_file(actor.hand)
+        require_hand(actor.hand)
         for prop in actor.objects:
             require_mesh(prop.mesh)
+
+
+def require_hand(path: Path | None) -> None:
+    """Raise `ConfigError` unless the hand profile, a file or the name of a shipped one, can be opened.
+
+    None stands for an option that was not given.
+    """
+    try:
+        require_file(None if path is None else hand_file(path))
+    except ConfigError as error:
+        raise ConfigError(f"{error}; shipped hands are {', '.join(NAMES)}") from None
 
 
 def require_file(path: Path | None) -> None:

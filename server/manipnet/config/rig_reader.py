@@ -12,6 +12,7 @@ import numpy as np
 from manipnet.common.options import ConfigError, shorten
 from manipnet.config.settings import SCALE_RANGE, WRISTS, ActorConfig, BodyConfig, ObjectConfig, all_options
 from manipnet.config.toml_source import Place, read_tree
+from manipnet.synthesis.hand.shipped_files import hand_file
 from manipnet.synthesis.objects.library import library_file, library_names
 from manipnet.synthesis.objects.units import UNITS_M
 from manipnet.wire.hand_names import ANGLE_NAMES
@@ -120,7 +121,9 @@ class _Reader:
         if value is None:
             return None
         text = self._typed(value, (str,), at, "the file of a hand profile")
-        return self._folder / text if text and len(text) <= 4096 else self._fail(at, "is empty or too long for a file")
+        if not text or len(text) > 4096:
+            return self._fail(at, "is empty or too long for a file")
+        return hand_file(text, self._folder)
 
     def _limits(self, value: Any, at: Place) -> dict[str, tuple[float, float]]:
         at = (*at, "limits_deg")

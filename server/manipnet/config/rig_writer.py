@@ -14,6 +14,7 @@ from manipnet.common.atomic_file import replacing
 from manipnet.common.options import ConfigError, to_toml
 from manipnet.config.rig_reader import parse_rig
 from manipnet.config.settings import ActorConfig, BodyConfig, ObjectConfig, ServerConfig, protocol_options
+from manipnet.synthesis.hand.shipped_files import hand_name
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 
 if TYPE_CHECKING:
@@ -119,7 +120,7 @@ def _actor(actor: ActorConfig) -> dict[str, Any]:
     table: dict[str, Any] = {"hand_scale": actor.hand_scale} if actor.hand_scale != 1.0 else {}
     table["bodies"] = {wrist: _body(body) for wrist, body in actor.wrists.items()}
     if actor.hand is not None:
-        table["hand"] = str(actor.hand.resolve())
+        table["hand"] = hand_name(actor.hand) or str(actor.hand.resolve())
     if actor.limits:
         ends = {name: [_degrees(low), _degrees(high)] for name, (low, high) in actor.limits.items()}
         table["limits_deg"] = ends

@@ -9,7 +9,7 @@ import json
 import logging
 import queue
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 import msgpack
@@ -23,6 +23,7 @@ STORING_OPS: Final = ("calibrate", "place_object")
 """Operations that change the rig file on the server's machine unless the request has `"store": false`."""
 SLOW_OPS: Final = {
     "add_object": "objects",
+    "hand_profile": "hands",
     "select_object": "selection",
     "record": "recording",
     "stop_recording": "recording",
@@ -48,10 +49,10 @@ class Dispatcher:
         """The slow requests of each thread that has had any."""
         self._lock = threading.Lock()
 
-    def submit(self, parts: list[bytes], reply: Reply, here: bool = True) -> None:
+    def submit(self, parts: list[bytes], reply: Reply, here: bool = True, ops: Sequence[str] = _OPS) -> None:
         """Handle one message, whatever it contains. Pass the answer to `reply`, later if the operation is slow.
 
-        `here` says whether the message comes from this machine.
+        `here` says whether the message comes from this machine. `ops` are the operations that its sender may use.
         """
         as_json = bool(parts) and parts[0].lstrip()[:1] in (b"{", b"[")
 
@@ -62,7 +63,7 @@ class Dispatcher:
         op = "invalid"
         try:
             request = _decode(parts)
-            op = _operation(request)
+            op = _operation(request, ops)
             if op in LOCAL_OPS and not here:
                 raise RequestError(
                     f"{op} opens files of the server's machine, so only a client on that machine may ask; put the mesh "
@@ -130,8 +131,8 @@ def _decode(parts: list[bytes]) -> Request:
     return request
 
 
-def _operation(request: Request) -> str:
+def _operation(request: Request, allowed: Sequence[str]) -> str:
     op = request.get("op")
-    if not isinstance(op, str) or op not in _OPS:
-        raise RequestError(f"op is {quoted(op)}; allowed are {', '.join(_OPS)}")
+    if not isinstance(op, str) or op not in allowed:
+        raise RequestError(f"op is {quoted(op)}; allowed {'are' if len(allowed) > 1 else 'is'} {', '.join(allowed)}")
     return op

@@ -16,6 +16,7 @@ MOST = 64
 MOST_WAITING = 32
 """Frames that are evaluated together, since that costs less than one by one."""
 RATE_S = 1.0
+"""The period of a rate. Whatever has been silent for as long has a rate of zero, and not the one that it had before."""
 CLOCK_S = 10.0
 """The fastest frame of the last one to two of these periods counts, since clocks drift."""
 SETTLED_S = 0.25
@@ -112,7 +113,7 @@ class _Sender:
         """One sender in `SenderStats.report`."""
         return {
             "frames": self._frames,
-            "rate_hz": self._rate_hz if now_s - self._heard_s < 2.0 * RATE_S else 0.0,
+            "rate_hz": self._rate_hz if now_s - self._heard_s <= RATE_S else 0.0,
             "age_s": max(now_s - self._heard_s, 0.0),
             "clock_offset_s": max(self._offset_s, self._offset_before_s),
             "clock_uncertainty_s": None,
@@ -198,11 +199,13 @@ class _Body:
     def report(self, id: int | None, name: str | None, now_s: float, is_settled: bool) -> dict[str, Any]:
         """`id`, `name`, `rate_hz`, `age_s` and the share of the frames in which it was `tracked`."""
         is_young = not self._rate_hz
+        age_s = max(now_s - self.heard_s, 0.0)
+        rate_hz = self._rate_so_far() if is_young and is_settled else self._rate_hz
         return {
             "id": id,
             "name": name,
-            "rate_hz": self._rate_so_far() if is_young and is_settled else self._rate_hz,
-            "age_s": max(now_s - self.heard_s, 0.0),
+            "rate_hz": rate_hz if age_s <= RATE_S else 0.0,
+            "age_s": age_s,
             "tracked": self._tracked / self._counted if self._counted and is_young else self._share,
         }
 

@@ -4,8 +4,9 @@ The command line, the rig file, the counters, the `ready` line and the documenta
 declaration loads at `--help`, so it imports heavy libraries only inside `open`.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from manipnet.common.options import Protocol
@@ -13,8 +14,18 @@ from manipnet.common.options import Protocol
 if TYPE_CHECKING:
     from manipnet.net.curve_keys import ServerKeys
     from manipnet.synthesis.hand.hand import Hand
+    from manipnet.synthesis.hand.profile import HandProfile
     from manipnet.telemetry import Telemetry
     from manipnet.wire import HandsMessage
+
+
+Submit = Callable[[bytes, Callable[[bytes], object]], object]
+"""Passes on a request in JSON or msgpack, and returns at once; the second argument gets the answer, on any thread."""
+
+
+def no_requests(_request: bytes, reply: Callable[[bytes], object]) -> None:
+    """Refuse every request."""
+    reply(b'{"error": "this server takes no requests here"}')
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,15 +39,31 @@ class Emission:
     """The address of this machine to listen on."""
     keys: "ServerKeys | None" = None
     """The keys that clients must have where a protocol knows keys."""
+    avatars: Mapping[str, str] = field(default_factory=dict)
+    """The name of the avatar that was given for an actor at the start, by the actor's name."""
+    submit: Submit = no_requests
+    """Takes the requests of clients that receive hands. Only `hand_profile` is allowed."""
 
 
-@dataclass(frozen=True, slots=True)
 class EncodedHands:
-    """A hands message with its two encodings, which every output may use."""
+    """A hands message and its two encodings, each of which is made once, when the first output needs it."""
 
-    message: "HandsMessage"
-    msgpack: bytes
-    binary: bytes
+    def __init__(self, message: "HandsMessage") -> None:
+        self.message = message
+
+    @cached_property
+    def binary(self) -> bytes:
+        """The payload of `pose/bin`. Raises `MessageError` for a message that breaks the protocol's rules."""
+        from manipnet.wire import encode_binary
+
+        return encode_binary(self.message)
+
+    @cached_property
+    def msgpack(self) -> bytes:
+        """The payload of `pose/msgpack`. Raises `MessageError` as `binary` does."""
+        from manipnet.wire import encode_msgpack
+
+        return encode_msgpack(self.message, checked="binary" in self.__dict__)
 
 
 class HandsOutput:
@@ -53,11 +80,13 @@ class HandsOutput:
         """Whether a client has subscribed to the hands of an avatar, by the name of its profile."""
         return False
 
-    def send_avatar(self, message: "HandsMessage") -> None:
-        """Send the hands of an avatar, which `message.hand` names, in the encodings that clients want.
+    def send_avatar(self, hands: EncodedHands, profile: "HandProfile") -> bool:
+        """Send the hands of an avatar, whose profile is given, in the encodings that clients want.
 
+        Returns whether they were sent in place of the model's hands, which `send` has left out.
         Raises `OSError` if they cannot be sent, and `MessageError` for a message that breaks the protocol's rules.
         """
+        return False
 
     def close(self) -> None:
         """Close the sockets. Does nothing the second time."""

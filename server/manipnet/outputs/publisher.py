@@ -4,8 +4,9 @@ import logging
 from collections.abc import Callable, Mapping
 
 from manipnet.outputs.declaration import EncodedHands, HandsOutput, Output
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
-from manipnet.wire import HandsMessage, encode_binary, encode_msgpack
+from manipnet.wire import HandsMessage
 
 _log = logging.getLogger(__name__)
 
@@ -36,8 +37,8 @@ class Publisher:
 
     def publish(self, message: HandsMessage) -> None:
         """Send one message to everybody. Raises `MessageError` for a message that breaks the protocol's rules."""
-        binary = encode_binary(message)
-        hands = EncodedHands(message, encode_msgpack(message, checked=True), binary)
+        hands = EncodedHands(message)
+        _ = hands.binary  # checks the message before anybody gets it
         self._record(hands.msgpack)
         for declared, output in self._outputs.items():
             try:
@@ -51,11 +52,14 @@ class Publisher:
         """Whether anybody has subscribed to the hands of an avatar, by the name of its profile."""
         return any(output.wants(avatar) for output in self._outputs.values())
 
-    def publish_avatar(self, message: HandsMessage) -> None:
-        """Send the hands of an avatar, which `message.hand` names. Raises `MessageError` as `publish` does."""
+    def publish_avatar(self, message: HandsMessage, profile: HandProfile) -> None:
+        """Send the hands of an avatar, whose profile is given. Raises `MessageError` as `publish` does."""
+        hands = EncodedHands(message)
         for declared, output in self._outputs.items():
             try:
-                output.send_avatar(message)
+                if output.send_avatar(hands, profile):
+                    for topic in declared.labels:
+                        self._telemetry.count("messages_out", topic=topic)
             except OSError as error:
                 _log.warning("%s: an avatar's hands cannot be sent: %s", declared.name, error)
 

@@ -25,7 +25,7 @@ class AvatarAudience(Protocol):
 
     def wants(self, avatar: str) -> bool: ...
 
-    def publish_avatar(self, message: HandsMessage) -> None: ...
+    def publish_avatar(self, message: HandsMessage, profile: HandProfile) -> None: ...
 
 
 class TooManyProfilesError(ValueError):
@@ -94,9 +94,8 @@ class Avatars:
         assert self.audience is not None
         try:
             poses = avatar.poses(actor, tick, hands)
-            self.audience.publish_avatar(
-                replace(message, hands=poses, hand=avatar.profile.name, t_publish=self._clock())
-            )
+            shown = replace(message, hands=poses, hand=avatar.profile.name, t_publish=self._clock())
+            self.audience.publish_avatar(shown, avatar.profile)
         except Exception as error:
             self._telemetry.count("tick_errors", stage="avatar")
             _log.error("hand profile %s failed: %s: %s", avatar.profile.name, type(error).__name__, error)

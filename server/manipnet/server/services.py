@@ -1,6 +1,7 @@
 """Everything of a server that listens or sends, and the loop between its ends."""
 
 import logging
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Final
@@ -27,6 +28,8 @@ from manipnet.telemetry import Telemetry
 
 _log = logging.getLogger(__name__)
 LOOPBACK: Final = "127.0.0.1"
+RECEIVERS_OPS: Final = ("hand_profile",)
+"""The operations that are open to clients that only receive hands, as browsers do."""
 
 
 @dataclass(frozen=True)
@@ -48,15 +51,20 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     opened.callback(recorder.stop)
     triggers = TriggeredRecordings(recorder, telemetry)
     opened.callback(triggers.close)
-    outputs = open_outputs(config.of, Emission(telemetry, session.bundle.hand, config.host, keys))
+    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers()}, telemetry)
+    opened.callback(dispatcher.close)
+
+    def submit(request: bytes, reply: Callable[[bytes], object]) -> None:
+        dispatcher.submit([request], reply, here=False, ops=RECEIVERS_OPS)
+
+    emission = Emission(telemetry, session.bundle.hand, config.host, keys, session.given_avatars, submit)
+    outputs = open_outputs(config.of, emission)
     publisher = Publisher(outputs, telemetry, recorder.note)
     opened.callback(publisher.close)
     session.avatars.audience = publisher
     meshes = MeshWatch(session.catalog, session.replace_shape)
     opened.callback(meshes.stop)
     meshes.start()
-    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers()}, telemetry)
-    opened.callback(dispatcher.close)
     control = Control(config.host, config.control_port, dispatcher, telemetry, keys)
     opened.callback(control.stop)
     control.start()

@@ -13,6 +13,7 @@ from manipnet.actors.avatar import Avatar
 from manipnet.actors.props import Prop
 from manipnet.config.settings import ActorConfig, ServerConfig
 from manipnet.control.actors_proxy import ActorsProxy
+from manipnet.control.body_gauges import body_gauges
 from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.hand_requests import HandRequests
 from manipnet.control.peers import Peers
@@ -57,6 +58,8 @@ class Session:
         self.actors = [self._load_actor(actor) for actor in config.actors]
         profiles = {actor.name: read_profile(actor.hand) for actor in config.actors if actor.hand is not None}
         avatars = {actor: Avatar(profile, self.bundle.hand) for actor, profile in profiles.items()}
+        self.given_avatars = {actor: profile.name for actor, profile in profiles.items()}
+        """The name of the profile that was given for an actor at the start, by the actor's name."""
         self.avatars = avatars_of(self.actors, avatars, self.telemetry)
         self._mailbox = Mailbox(self.telemetry)
         self._proxy = ActorsProxy(self.actors, self._mailbox)
@@ -64,6 +67,7 @@ class Session:
         """Where the receivers leave frames."""
         self.peers = Peers(self.senders)
         self.telemetry.add_gauges(self.peers.gauges)
+        self.telemetry.add_gauges(lambda: body_gauges(self._proxy))
         self.addresses: dict[str, str] = {}
         """The address of every socket by what it carries, once they are open."""
 

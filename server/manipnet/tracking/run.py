@@ -8,7 +8,7 @@ import numpy as np
 from manipnet.geometry import Array, compose
 from manipnet.tracking.arrivals import Arrivals
 from manipnet.tracking.pose_buffer import TIME_TOLERANCE_S, PoseBuffer
-from manipnet.tracking.tick import TICK_HZ, BodyHealth, Poses
+from manipnet.tracking.tick import CURRENT_S, TICK_HZ, BodyHealth, Poses
 
 VANISHED_S: Final = 0.1
 """A tick waits no longer than this for one body while frames with others arrive."""
@@ -59,7 +59,11 @@ class Run:
         """How every body of this run arrives."""
         clock_s = self.arrivals.clock_s(now_s)
         return {
-            name: BodyHealth(1.0 / track.interval_s(), track.age_s(clock_s), track.noise)
+            name: BodyHealth(
+                1.0 / track.interval_s() if track.age_s(clock_s) <= CURRENT_S else 0.0,
+                track.age_s(clock_s),
+                track.noise,
+            )
             for name, track in self.tracks.items()
         }
 

@@ -12,6 +12,8 @@ from manipnet.tracking.smoothing import Smoothing
 
 TICK_HZ: Final = 60
 TICK_S: Final = 1.0 / TICK_HZ
+CURRENT_S: Final = 1.0
+"""A body of which nothing has come for longer than this has no rate any more."""
 
 Pose = Array | Sequence[float]
 Poses = Mapping[str, Pose | None]
@@ -36,7 +38,7 @@ class BodyAtTick:
 class BodyHealth:
     """How a body arrives: the rate of its tracked samples, the age of the newest one, and their noise.
 
-    The age is by the stream's clock.
+    The age is by the stream's clock. The rate is the present one: zero once nothing has come for `CURRENT_S`.
     """
 
     rate_hz: float

@@ -4,11 +4,14 @@ A header is followed by a record for each hand and a record for each body. The h
 later writer may append fields, which this reader skips.
 """
 
+import math
+import struct
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from manipnet.geometry import SIDES
+from manipnet.geometry import SIDES, Side
 from manipnet.wire.bodies import MAX_BODIES, MessageError
 from manipnet.wire.hands import (
     BODY,
@@ -37,26 +40,20 @@ def encode_binary(message: HandsMessage) -> bytes:
     Raises `MessageError` for a message that breaks a rule, for example with a number that is not finite.
     """
     check(message)
-    header = np.zeros((), HEADER if message.timecode is None else TIMED_HEADER)
-    hands = np.zeros(len(message.hands), HAND)
-    bodies = np.zeros(len(message.bodies), BODY)
-    size = header.itemsize
-    sizes = (size, size + hands.nbytes + bodies.nbytes, HAND.itemsize, BODY.itemsize)
-    preamble = (MAGIC, VERSION, *sizes, len(hands), len(bodies))
-    for name, value in zip(PREAMBLE.names or (), preamble, strict=True):
-        header[name] = value
-    _fill(header, message)
-    for name in LATENCY.names or ():
-        header["latency_ms"][name] = getattr(message.latency_ms, name)
-    if message.timecode is not None:
-        _fill_name(header["timecode"], message.timecode)
-        header["timecode_rate"] = message.timecode_rate or 0.0
-    for record, (side, hand) in zip(hands, message.hands.items(), strict=True):
-        record["side"], record["has_object"] = SIDES.index(side), hand.object is not None
-        _fill(record, hand)
-    for record, body in zip(bodies, message.bodies, strict=True):
-        _fill(record, body)
-    return header.tobytes() + hands.tobytes() + bodies.tobytes()
+    timed = message.timecode is not None
+    hands = [_hand_record(side, hand) for side, hand in message.hands.items()]
+    bodies = [_BODY.pack(body.tracked, *body.pose.tolist(), _name(body.name)) for body in message.bodies]
+    size = (TIMED_HEADER if timed else HEADER).itemsize
+    total = size + len(hands) * HAND.itemsize + len(bodies) * BODY.itemsize
+    header = _HEADER.pack(
+        *(MAGIC, VERSION, size, total, HAND.itemsize, BODY.itemsize, len(hands), len(bodies)),
+        *(_name(message.session), _name(message.actor), message.seq),
+        *(message.t_capture, message.t_publish, message.look_ahead),
+        *(getattr(message.latency_ms, name) for name in LATENCY.names or ()),
+    )
+    if timed:
+        header += _TIMECODE.pack(_name(message.timecode or ""), message.timecode_rate or 0.0)
+    return b"".join([header, *hands, *bodies])
 
 
 def decode_binary(payload: bytes) -> HandsMessage:
@@ -119,20 +116,44 @@ def _hand(record: np.void, index: int) -> HandPose:
     return HandPose(**values)
 
 
-def _fill(record: Any, value: Any) -> None:
-    """Copy the fields of a dataclass into its record."""
-    for name, dtype in RECORDS[type(value)]:
-        field_value = getattr(value, name)
-        if dtype == NAME:
-            _fill_name(record[name], field_value or "")
-        else:
-            record[name] = STATES.index(field_value) if name == "state" else field_value
+_CODES: Mapping[str, str] = {"u1": "B", "u2": "H", "u4": "I", "u8": "Q", "f4": "f", "f8": "d", "S4": "4s"}
 
 
-def _fill_name(record: Any, name: str) -> None:
+def _packer(dtype: np.dtype, names: Sequence[str] = ()) -> struct.Struct:
+    """Packs the fields of a record, or those named, from their first to the end of the record."""
+    places = [place[:2] for name, place in (dtype.fields or {}).items() if not names or name in names]
+    text, at = "<", places[0][1]
+    for kind, offset in places:
+        text += "x" * (offset - at) + _code(kind)
+        at = offset + kind.itemsize
+    return struct.Struct(text + "x" * (dtype.itemsize - at))
+
+
+def _code(kind: np.dtype) -> str:
+    if kind == NAME:
+        return f"{NAME.itemsize}s"
+    if kind == LATENCY:
+        return "f" * len(LATENCY.names or ())
+    base, shape = kind.subdtype or (kind, ())
+    code = _CODES[base.str[1:]]
+    return code if base.kind == "S" else f"{math.prod(shape)}{code}"
+
+
+_HEADER, _HAND, _BODY = _packer(HEADER), _packer(HAND), _packer(BODY)
+_TIMECODE = _packer(TIMED_HEADER, ("timecode", "timecode_rate"))
+
+
+def _hand_record(side: Side, hand: HandPose) -> bytes:
+    numbers = (hand.angles, hand.rotations, hand.wrist, hand.joints)
+    return _HAND.pack(
+        *(SIDES.index(side), hand.object is not None, STATES.index(hand.state), _name(hand.object or ""), hand.scale),
+        *np.concatenate([part.ravel() for part in numbers]).tolist(),
+    )
+
+
+def _name(name: str) -> bytes:
     text = _cut(name)
-    record["length"] = len(text)
-    record["text"][: len(text)] = np.frombuffer(text, np.uint8)
+    return bytes([len(text)]) + text
 
 
 def _timecode(header: np.void) -> dict[str, Any]:

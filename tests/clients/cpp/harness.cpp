@@ -16,13 +16,18 @@
 #include <vector>
 
 #include "ArmIk.h"
+#include "AvatarClient.h"
 #include "Axes.h"
 #include "BoneNames.h"
 #include "Client.h"
+#include "ControlClient.h"
 #include "Decoder.h"
+#include "HandProfile.h"
 #include "Interpolator.h"
+#include "Json.h"
 #include "LocalClock.h"
 #include "Skeleton.h"
+#include "SubjectHand.h"
 #include "Timecode.h"
 
 using namespace manipnet;
@@ -229,6 +234,148 @@ void Arms() {
     }
 }
 
+bool Connect(const std::string& address, Connection& to) {
+    const std::string error = ParseConnection(address + " delay=0.05", to);
+    if (!error.empty()) std::cerr << error << "\n";
+    return error.empty();
+}
+
+std::vector<std::string> SplitTabs(const std::string& line) {
+    std::vector<std::string> words(1);
+    for (const char c : line) {
+        if (c == '\t') words.emplace_back();
+        else words.back() += c;
+    }
+    return words;
+}
+
+/// Reads lines with a side and the names of bones, separated by tabs; prints the indices of the hand, 15 finger bones and 4
+/// metacarpals.
+void Find() {
+    for (std::string line; std::getline(std::cin, line);) {
+        std::vector<std::string> names = SplitTabs(line);
+        const Side side = names[0] == "left" ? Side::Left : Side::Right;
+        names.erase(names.begin());
+        const BoneIndices found = FindBones(names, std::vector<int>(names.size(), -1), side, BoneMap());
+        std::cout << found.Hand;
+        for (const int bone : found.Fingers) std::cout << " " << bone;
+        for (std::size_t finger = 1; finger < kFingers; ++finger) std::cout << " " << found.Metacarpals[finger];
+        std::cout << "\n";
+    }
+}
+
+/// Sends the requests of standard input, one a line, and prints the replies.
+int Control(const std::string& address) {
+    Connection to;
+    if (!ParseConnection(address, to).empty()) return 2;
+    const std::atomic<bool> stop{false};
+    for (std::string line; std::getline(std::cin, line);) {
+        const Answer answer = ControlClient(to.Host, to.Port, stop, 5000).Ask(line);
+        std::cout << (answer.Problem.empty() ? answer.Reply : (answer.Refused ? "refused: " : "failed: ") + answer.Problem) << "\n";
+    }
+    return 0;
+}
+
+/// Reads a hand at rest: side, 15 times presence and pose, 5 times presence and tip, the same for metacarpals.
+RestHand ReadRest(Side& side) {
+    double number = 0.0;
+    std::cin >> number;
+    side = number > 0.5 ? Side::Right : Side::Left;
+    RestHand rest;
+    const auto read = [&number](bool& there, Vec& at) {
+        std::cin >> number >> at.X >> at.Y >> at.Z;
+        there = number > 0.5;
+    };
+    for (std::size_t i = 0; i < kFingerBones; ++i) {
+        Quat& q = rest.Rotations[i];
+        read(rest.HasBone[i], rest.Positions[i]);
+        std::cin >> q.X >> q.Y >> q.Z >> q.W;
+    }
+    for (std::size_t i = 0; i < kFingers; ++i) read(rest.HasTip[i], rest.Tips[i]);
+    for (std::size_t i = 0; i < kFingers; ++i) read(rest.HasMetacarpal[i], rest.Metacarpals[i]);
+    return rest;
+}
+
+/// Prints the profile of each hand that is read, or why it has none.
+void Profiles() {
+    while (std::cin >> std::ws && !std::cin.eof()) {
+        Side side = Side::Left;
+        const RestHand rest = ReadRest(side);
+        HandProfile profile;
+        const std::string problem = MakeProfile(side, rest, profile);
+        const bool left = side == Side::Left;
+        std::cout << (problem.empty() ? ProfileJson("avatar", left ? &profile : nullptr, left ? nullptr : &profile) : "error: " + problem)
+                  << "\n";
+    }
+}
+
+/// The OpenXR joints of a message relative to each other, as the subject's bones in Live Link.
+HandPose PoseOf(const HandFrame& hand) {
+    Skeleton::Poses poses;
+    Skeleton::LocalPoses(hand, Placement(), poses);
+    std::vector<std::string> names;
+    std::vector<int> parents;
+    std::vector<LocalBone> local;
+    for (std::size_t bone = 0; bone < Skeleton::kBones; ++bone) {
+        names.emplace_back(Skeleton::BoneName(bone));
+        parents.push_back(Skeleton::ParentOf(bone));
+        local.push_back({RotationOf(poses[bone]), PositionOf(poses[bone])});
+    }
+    SubjectHand subject;
+    if (!subject.Bind(names, parents)) std::abort();
+    return subject.Read(local);
+}
+
+std::string Doubles(const std::vector<double>& values) {
+    std::string text = "[";
+    for (const double value : values) text += (text.size() > 1 ? "," : "") + Number(value);
+    return text + "]";
+}
+
+/// Uploads the profile of the two hands in the first lines and receives them. For each further line it prints the state, the
+/// frames received, and for each hand the joints of the message and the hand bone and finger bones of the avatar.
+int Avatar(const std::string& address, const std::string& control, const std::string& name) {
+    Connection to;
+    if (!Connect(address, to)) return 2;
+    to.ControlPort = static_cast<std::uint16_t>(std::stoi(control.substr(control.rfind(':') + 1)));
+    HandProfile profiles[2];
+    HandRig rigs[2];
+    for (int i = 0; i < 2; ++i) {
+        Side side = Side::Left;
+        const RestHand rest = ReadRest(side);
+        if (!MakeProfile(side, rest, profiles[i]).empty()) return 3;
+        rigs[i] = ExactRig(rest, profiles[i]);
+    }
+    std::string line;
+    std::getline(std::cin, line);
+    AvatarClient client(to, name, ProfileJson(name, &profiles[0], &profiles[1]));
+    HandsFrame shown;
+    while (std::getline(std::cin, line)) {
+        float weight = 0.0F;
+        const bool any = client.Sample(LocalNow(), shown, weight);
+        const Stats stats = client.GetStats();
+        std::string text = "{\"state\": " + QuotedJson(stats.State) + ", \"received\": " + std::to_string(stats.Received);
+        text += ", \"weight\": " + Number(static_cast<double>(weight));
+        for (const Side side : {Side::Left, Side::Right}) {
+            const HandFrame& hand = shown.Hand(side);
+            if (!any || !hand.Present) continue;
+            const HandRig& rig = rigs[static_cast<std::size_t>(side)];
+            const HandPose pose = PoseOf(hand);
+            const Quat q = rig.HandRotation(pose);
+            const Vec& p = pose.WristPosition;
+            std::vector<double> bones;
+            for (const Quat& b : rig.Solve(pose)) bones.insert(bones.end(), {b.X, b.Y, b.Z, b.W});
+            text += side == Side::Left ? ", \"left\": " : ", \"right\": ";
+            text += "{\"joints\": " + Floats(hand.Joints) + ", \"hand\": " + Doubles({p.X, p.Y, p.Z, q.X, q.Y, q.Z, q.W});
+            text += ", \"bones\": " + Doubles(bones) + "}";
+        }
+        std::cout << text << "}" << std::endl;
+    }
+    client.Stop();
+    std::cout << "closed" << std::endl;
+    return 0;
+}
+
 /// Shows hands as a program would, and records what it received and showed. Only answers allocate.
 class Show {
 public:
@@ -277,12 +424,6 @@ private:
     float Weight = 0.0F;
     long Shows = 0;
 };
-
-bool Connect(const std::string& address, Connection& to) {
-    const std::string error = ParseConnection(address + " delay=0.05", to);
-    if (!error.empty()) std::cerr << error << "\n";
-    return error.empty();
-}
 
 /// Shows at about 90 Hz until standard input ends. Answers "arrivals" with number and time of every frame since the
 /// last time, and any other line with figures.
@@ -358,6 +499,14 @@ int main(int count, char** words) {
         BoneMaps();
     } else if (verb == "arms") {
         Arms();
+    } else if (verb == "find") {
+        Find();
+    } else if (verb == "profile") {
+        Profiles();
+    } else if (verb == "control" && count == 3) {
+        return Control(words[2]);
+    } else if (verb == "avatar" && count == 5) {
+        return Avatar(words[2], words[3], words[4]);
     } else if (verb == "live" && count == 3) {
         return Live(words[2]);
     } else if (verb == "idle" && count == 3) {

@@ -22,6 +22,7 @@ static class Glue
     static int Main(string[] args)
     {
         Thread.CurrentThread.CurrentCulture = CultureInfo.InvariantCulture;
+        if (args.Length > 1) return AvatarScene.Run(args[0], args[1]);
         var tests = new ManipNet.Client.Tests.DecoderTests();
         tests.RefusesOtherData();
         tests.NamesBothVersionsWhenItRefusesOne();

@@ -52,6 +52,15 @@ static class Harness
             case "control":
                 Control(args[1]);
                 return 0;
+            case "find":
+                Find();
+                return 0;
+            case "profile":
+                PrintProfiles();
+                return 0;
+            case "avatar":
+                Avatar(args[1], args[2], args[3]);
+                return 0;
             case "websocket":
                 WebSocket(args[1]);
                 return 0;
@@ -299,6 +308,102 @@ static class Harness
         double number;
         if (word == "true" || word == "false") return word == "true";
         return double.TryParse(word, NumberStyles.Float, CultureInfo.InvariantCulture, out number) ? (object)number : word;
+    }
+
+    /// <summary>
+    /// Reads lines with a side and the names of bones, separated by tabs; prints the indices of the hand, 15 finger bones and 4
+    /// metacarpals.
+    /// </summary>
+    static void Find()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            string[] words = line.Split('\t');
+            BoneIndices found = BoneFinder.Find(words.Skip(1).ToArray(), words[0] == "left" ? Side.Left : Side.Right);
+            Console.WriteLine(string.Join(" ", new[] { found.Hand }.Concat(found.Fingers).Concat(found.Metacarpals.Skip(1)).Select(i => i.ToString()).ToArray()));
+        }
+    }
+
+    /// <summary>Reads a hand at rest: side, 15 times presence and pose, 5 times presence and tip, the same for metacarpals.</summary>
+    static RestHand ReadRest(string line, out Side side)
+    {
+        float[] x = line.Split(' ').Select(word => float.Parse(word, CultureInfo.InvariantCulture)).ToArray();
+        side = (Side)x[0];
+        var rest = new RestHand();
+        for (int i = 0; i < 15; i++)
+        {
+            int at = 1 + 8 * i;
+            rest.Present[i] = x[at] != 0f;
+            rest.Positions[i] = new Vec3(x[at + 1], x[at + 2], x[at + 3]);
+            rest.Rotations[i] = new Quat(x[at + 4], x[at + 5], x[at + 6], x[at + 7]);
+        }
+        for (int i = 0; i < 5; i++)
+        {
+            int tip = 121 + 4 * i, metacarpal = 141 + 4 * i;
+            rest.HasTip[i] = x[tip] != 0f;
+            rest.Tips[i] = new Vec3(x[tip + 1], x[tip + 2], x[tip + 3]);
+            rest.HasMetacarpal[i] = x[metacarpal] != 0f;
+            rest.Metacarpals[i] = new Vec3(x[metacarpal + 1], x[metacarpal + 2], x[metacarpal + 3]);
+        }
+        return rest;
+    }
+
+    /// <summary>Prints the profile of each hand that is read, or why it has none.</summary>
+    static void PrintProfiles()
+    {
+        string line;
+        while ((line = Console.ReadLine()) != null)
+        {
+            try
+            {
+                Side side;
+                RestHand rest = ReadRest(line, out side);
+                var profile = new HandProfile(side, rest);
+                Console.WriteLine(HandProfile.Json("avatar", side == Side.Left ? profile : null, side == Side.Right ? profile : null));
+            }
+            catch (ArgumentException error)
+            {
+                Console.WriteLine("error: " + error.Message);
+            }
+        }
+    }
+
+    /// <summary>
+    /// Uploads the profile of the two hands in the first lines and receives them. For each further line it prints the state, the
+    /// frames received, and for each hand the joints of the message and the hand bone and finger bones of the avatar.
+    /// </summary>
+    static void Avatar(string address, string control, string name)
+    {
+        Side side;
+        AvatarRig[] rigs = { new AvatarRig(Side.Left, ReadRest(Console.ReadLine(), out side)), new AvatarRig(Side.Right, ReadRest(Console.ReadLine(), out side)) };
+        string profile = HandProfile.Json(name, rigs[0].Profile, rigs[1].Profile);
+        var shown = new HandsFrame();
+        var bones = new Quat[15];
+        using (var client = new AvatarClient(address, control, name, profile, null, 0.05))
+        {
+            while (Console.ReadLine() != null)
+            {
+                float weight;
+                bool any = client.Sample(LocalClock.Now, shown, out weight);
+                Stats stats = client.GetStats();
+                var text = new StringBuilder("{\"state\": " + ControlClient.Quoted(stats.State) + ", \"received\": " + stats.Received + ", \"weight\": " + Number(weight));
+                foreach (Side which in new[] { Side.Left, Side.Right })
+                {
+                    HandFrame hand = shown.Hand(which);
+                    if (!any || !hand.Present) continue;
+                    AvatarRig rig = rigs[(int)which];
+                    rig.Solve(hand, bones);
+                    Vec3 p = rig.HandPosition(hand);
+                    Quat q = rig.HandRotation(hand);
+                    text.Append(", \"" + which.ToString().ToLowerInvariant() + "\": {\"joints\": " + Floats(hand.Joints));
+                    text.Append(", \"hand\": " + Floats(new[] { p.X, p.Y, p.Z, q.X, q.Y, q.Z, q.W }));
+                    text.Append(", \"bones\": " + Floats(bones.SelectMany(b => new[] { b.X, b.Y, b.Z, b.W }).ToArray()) + "}");
+                }
+                Console.WriteLine(text.Append("}"));
+            }
+        }
+        Console.WriteLine("closed");
     }
 
     /// <summary>A web socket that a script drives.</summary>

@@ -52,6 +52,38 @@ def armature(name="Rig", sides=("Left", "Right"), scale=1.0, connected=False, ar
     return made
 
 
+def skin(rig, names, radius_m=0.008):
+    """A mesh that the bones deform: for each name a tube about the bone's rest, with a point at its far end."""
+    points, faces, groups = [], [], []
+    for name in names:
+        bone = rig.data.bones[name]
+        place = rig.matrix_world @ bone.matrix_local
+        length = bone.length * rig.matrix_world.median_scale
+        first = len(points)
+        for k in range(48):
+            along, angle = (k // 12) / 3.0, 2.0 * np.pi * (k % 12) / 12.0
+            ring = Vector((radius_m * np.cos(angle), 0.0, radius_m * np.sin(angle)))
+            rotation = place.to_quaternion()
+            points.append(place.to_translation() + rotation @ (ring + Vector((0.0, along * length, 0.0))))
+        points.append(place.to_translation() + place.to_quaternion() @ Vector((0.0, length + radius_m, 0.0)))
+        for k in range(36):
+            row, next_ = 12 * (k // 12), (k + 1) % 12
+            faces.append([first + k, first + row + next_, first + row + 12 + next_, first + k + 12])
+        faces += [[first + 36 + k, first + 36 + (k + 1) % 12, first + 48] for k in range(12)]
+        groups.append((name, list(range(first, first + 49))))
+    data = bpy.data.meshes.new("Skin")
+    data.from_pydata(points, [], faces)
+    made = bpy.data.objects.new("Skin", data)
+    bpy.context.scene.collection.objects.link(made)
+    for name, indices in groups:
+        made.vertex_groups.new(name=name).add(indices, 1.0, "REPLACE")
+    made.modifiers.new("Armature", "ARMATURE").object = rig
+    made.parent = rig
+    made.matrix_parent_inverse = rig.matrix_world.inverted()
+    bpy.context.view_layer.update()
+    return made
+
+
 def keyed_action(target, name, keys):
     """An action of the user, assigned to the object: a value for each data path, index and frame."""
     action = bpy.data.actions.new(name)

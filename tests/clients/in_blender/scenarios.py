@@ -63,8 +63,8 @@ def until(condition):
         tick()
 
 
-def start(*cast, control=""):
-    session.start(ADDRESS, 0.05, cast, control)
+def start(*cast, control="tcp://127.0.0.1:5557", props=False):
+    session.start(ADDRESS, 0.05, cast, control, props)
     until(lambda: all(character.shown for character in session.characters))
     for _ in range(3):
         tick()
@@ -514,7 +514,7 @@ def operators_connect_record_and_disconnect():
 
 def props_come_with_their_meshes_and_are_recorded():
     control = os.environ["MANIPNET_CONTROL"]
-    start(Cast(), control=control)
+    start(Cast(), control=control, props=True)
     until(lambda: "manipnet_mesh_Box" in bpy.data.objects)
     mesh = bpy.data.objects["manipnet_mesh_Box"]
     bounds = [max(v.co[i] for v in mesh.data.vertices) - min(v.co[i] for v in mesh.data.vertices) for i in range(3)]
@@ -532,11 +532,11 @@ def props_come_with_their_meshes_and_are_recorded():
     until(lambda: "manipnet_mesh_Box" in bpy.data.objects)
 
 
-def main():
+def main(scenarios):
     manipnet_live.register()
     bpy.ops.wm.read_homefile(use_empty=True)
     try:
-        globals()[NAME]()
+        scenarios[NAME]()
         session.stop()
         manipnet_live.unregister()
         status = 0
@@ -549,4 +549,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    main(globals())

@@ -1,10 +1,10 @@
 """Hands of avatars imported from rigs: names, units, sides, straightening, and what is refused."""
 
 import json
-import struct
 
 import numpy as np
 import pytest
+from rig_writer import write_glb
 
 from manipnet.geometry import SIDES, quat_exp, quat_rotate
 from manipnet.synthesis.hand.avatar import model_profile
@@ -35,27 +35,6 @@ def rig(scale=1.0, name="{side}Hand{word}{n}", hand="{side}Hand", tips=True, sid
                     nodes.append((name.format(side=side.capitalize(), word=word, n=n + 1), parent, placed[k]))
                     parent = len(nodes) - 1
     return nodes
-
-
-def write_glb(path, nodes, **more):
-    children = {n: [k for k, (_, parent, _) in enumerate(nodes) if parent == n] for n in range(len(nodes))}
-    document = {
-        "asset": {"version": "2.0"},
-        "scenes": [{"nodes": [0]}],
-        "nodes": [
-            {
-                "name": name,
-                "translation": (place - (nodes[parent][2] if parent >= 0 else 0.0)).tolist(),
-                **({"children": children[n]} if children[n] else {}),
-            }
-            for n, (name, parent, place) in enumerate(nodes)
-        ],
-        **more,
-    }
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    path.write_bytes(b"glTF" + struct.pack("<2I", 2, 20 + len(text)) + struct.pack("<I4s", len(text), b"JSON") + text)
-    return path
 
 
 def write_bvh(path, nodes):
@@ -116,6 +95,37 @@ def test_a_vrm_file_names_its_bones_itself(tmp_path):
                         humanoid[f"{side.lower()}{word.replace('Pinky', 'Little')}{part}"] = {"node": n}
     file = write_glb(tmp_path / "avatar.vrm", nodes, extensions={"VRMC_vrm": {"humanoid": {"humanBones": humanoid}}})
     same_hand(import_profile(file, "a", MODEL, lambda _: None), "right")
+
+
+@pytest.mark.parametrize("facing", [1.0, -1.0])
+def test_the_bones_of_a_t_pose_are_kept_whichever_way_the_avatar_faces(tmp_path, facing):
+    """VRM 1 faces +z in its file, and VRM 0 faces -z; in a profile, everybody faces +z."""
+    nodes, expected = [("Hips", -1, np.zeros(3))], {}
+    for side, along in zip(SIDES, (1.0, -1.0), strict=True):
+        palm = np.array([[0.0, 0.0, -along], [0.0, 1.0, 0.0], [along, 0.0, 0.0]])
+        expected[side] = model_profile(MODEL, side).joints[:, :3] @ palm.T
+        yaw, at = np.array([facing, 1.0, facing]), np.array([0.7 * along, 1.4, 0.1])
+        elbow = len(nodes)
+        nodes.append((f"{side.capitalize()}ForeArm", 0, yaw * (at + np.array([-0.24 * along, 0.01, 0.0]))))
+        nodes.append((f"{side.capitalize()}Hand", elbow, yaw * at))
+        for word, row in zip(WORDS, FINGERS, strict=True):
+            parent = elbow + 1
+            for n, k in enumerate(row if word == "Thumb" else row[1:]):
+                nodes.append((f"{side.capitalize()}Hand{word}{n + 1}", parent, yaw * (at + expected[side][k])))
+                parent = len(nodes) - 1
+    profile = import_profile(write_glb(tmp_path / "a.glb", nodes), "a", MODEL, lambda _: None)
+    bones = [k for row in FINGERS for k in (row if row is FINGERS[0] else row[1:])]
+    for side, along in zip(SIDES, (1.0, -1.0), strict=True):
+        t_pose, elbow = profile.hands[side].t_pose, profile.hands[side].elbow
+        assert t_pose is not None
+        assert elbow is not None
+        np.testing.assert_allclose(t_pose[bones], expected[side][bones], atol=1e-6)
+        np.testing.assert_allclose(elbow, [-0.24 * along, 0.01, 0.0], atol=1e-6)
+
+
+def test_a_rig_in_another_pose_has_no_t_pose(tmp_path):
+    profile = import_profile(write_glb(tmp_path / "a.glb", rig()), "a", MODEL, lambda _: None)
+    assert all(profile.hands[side].t_pose is None for side in SIDES)
 
 
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "metres"), (100.0, "centimetres"), (10.0, "decimetres")])

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from manipnet.common.atomic_file import replacing
+from manipnet.synthesis.hand.shipped_files import hand_file
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.mesh import load_mesh
 from manipnet.tracking.tick import TICK_HZ
@@ -81,7 +82,7 @@ def plan(options: BatchOptions) -> list[Job]:
         load_mesh(file)  # a mesh that cannot be read would make every take fail
     model, rig = load_bundle(options.model).folder.absolute(), read_rig(options.rig, options.actor)
     profile_of(options.hand, rig)  # so would a profile
-    hand = options.hand or (None if rig is None else rig.hand)
+    hand = hand_file(options.hand) if options.hand else None if rig is None else rig.hand
     names = take_names(options.folder, takes)
     return [
         Job(

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 from manipnet.common.options import ConfigError
-from manipnet.config.files import require_file
+from manipnet.config.files import require_file, require_hand
 from manipnet.config.settings import CONTROL_PORT, control_endpoint
 from manipnet.synthesis.model.providers import DEFAULT_MODEL, MAX_LOOK_AHEAD_S
 from manipnet.synthesis.model.shipped import find_bundle
@@ -156,7 +156,7 @@ class SynthesizeOptions(WritingOptions):
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
     hand: Annotated[Path | None, _optional("HAND.json")] = None
-    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
+    """Also write the hands of this avatar, or of a shipped one (generic, adult, child); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
 
@@ -168,7 +168,7 @@ class SynthesizeOptions(WritingOptions):
         find_bundle(self.model)
         require_look_ahead(self.look_ahead)
         require_file(self.rig)
-        require_file(self.hand)
+        require_hand(self.hand)
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class BatchOptions:
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor, if the rig has several; by default the first."""
     hand: Annotated[Path | None, _optional("HAND.json")] = None
-    """Also write the hands of this avatar (`manipnet hand import` makes the file); by default the rig's."""
+    """Also write the hands of this avatar, or of a shipped one (generic, adult, child); by default the rig's."""
     up: Literal["y", "z"] = "y"
     """The axis that points up in a Motive CSV or a recording; the file does not say which."""
     jobs: Annotated[int | None, _optional("N")] = None
@@ -209,7 +209,7 @@ class BatchOptions:
         find_bundle(self.model)
         require_look_ahead(self.look_ahead)
         require_file(self.rig)
-        require_file(self.hand)
+        require_hand(self.hand)
         if self.jobs is not None and self.jobs < 1:
             raise ConfigError(f"--jobs is {self.jobs}; it must be at least 1")
 
@@ -247,7 +247,7 @@ class ExportOptions(WritingOptions):
         if self.format == "bvh" and any(self.out.glob("*.bvh")) and not self.force:
             raise ConfigError(already_exists(f"--out {self.out}: a take in BVH files"))
         require_new(self.out, self.force or self.format == "bvh")
-        require_file(self.hand)
+        require_hand(self.hand)
         if self.right_handed and self.format != "bvh":
             raise ConfigError(f"--right-handed is for --format bvh only; {self.format} is always right-handed")
 

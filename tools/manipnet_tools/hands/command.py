@@ -7,15 +7,17 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from manipnet.common.command_line import Parser
-from manipnet.config.files import require_file
+from manipnet.config.files import require_file, require_hand
+from manipnet.synthesis.hand.shipped_files import NAMES
 from manipnet.synthesis.model.providers import DEFAULT_MODEL
 from manipnet.synthesis.model.shipped import find_bundle
 from manipnet_tools.commands.checks import require_meshes, require_new, require_take
 
+_HAND = "a profile, or a shipped hand: " + ", ".join(NAMES)
 EXAMPLES = (
     "import avatar.vrm --out hand.json            make a profile, and hand.png that shows it",
     "import avatar.glb --map bones.json --out hand.json",
-    "show hand.json --out hand.png",
+    "show adult --out adult.png                   draw a hand that is shipped",
     "check hand.json takes/mug1 --mesh mug1=mug1.obj",
 )
 FORCE = "replace what exists already"
@@ -45,12 +47,12 @@ def build_parser() -> Parser:
     take_in.add_argument("--force", action="store_true", help=FORCE)
     take_in.set_defaults(do=_import)
     show = verbs.add_parser("show", help="draw a profile")
-    show.add_argument("hand", type=Path, metavar="HAND.json")
+    show.add_argument("hand", type=Path, metavar="HAND", help=_HAND)
     show.add_argument("--out", type=Path, required=True, metavar="FILE.png", help="the picture to write")
     show.add_argument("--force", action="store_true", help=FORCE)
     show.set_defaults(do=_show)
     check = verbs.add_parser("check", help="measure on a take how much contact survives on the hand")
-    check.add_argument("hand", type=Path, metavar="HAND.json")
+    check.add_argument("hand", type=Path, metavar="HAND", help=_HAND)
     check.add_argument("take", type=Path, metavar="TAKE", help="the take, as for `manipnet synthesize`")
     check.add_argument("--mesh", action="append", default=[], metavar="NAME=FILE", help="an object and its mesh")
     check.add_argument("--model", default=DEFAULT_MODEL, metavar="NAME", help="the model (default: %(default)s)")
@@ -83,6 +85,7 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _draw(hand: Path, out: Path) -> None:
+    require_hand(hand)
     from manipnet.synthesis.hand.profile import read_profile
     from manipnet.synthesis.model.bundle import load_bundle
     from manipnet_tools.hands.drawing import draw_profile
@@ -94,7 +97,7 @@ def _draw(hand: Path, out: Path) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    require_file(options.hand)
+    require_hand(options.hand)
     require_take(options.take)
     require_meshes(options.mesh)
     find_bundle(options.model)

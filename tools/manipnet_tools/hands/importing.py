@@ -1,61 +1,68 @@
 """From a rig to a hand profile: the 26 OpenXR joints at rest with straight fingers, and radii from the skin."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from itertools import pairwise
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from manipnet.geometry import SIDES, Array, Side, matrix_to_quat, mirror_poses
-from manipnet.synthesis.hand.avatar import model_profile, openxr_frame
+from manipnet.geometry import SIDES, Side
 from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.hand.openxr import METACARPAL_BASE
-from manipnet.synthesis.hand.profile import FINGERS, HandProfile, ProfileHand, parse_profile
+from manipnet.synthesis.hand.profile import HandProfile, ProfileHand, parse_profile, profile_to_json
 from manipnet_tools.hands.bone_map import BoneMap, map_bones, read_map
-from manipnet_tools.hands.rig_file import RigFileError, Skeleton, read_skeleton
+from manipnet_tools.hands.rig_file import Skeleton, read_skeleton
+from manipnet_tools.hands.rig_hand import RigHand, rig_hand
 
 UNITS: Final = {"metres": 1.0, "centimetres": 0.01, "decimetres": 0.1, "millimetres": 0.001, "inches": 0.0254}
 """Units that a file without one may have."""
 HUMAN_M: Final = (0.13, 0.24)
-TIP_SHARE: Final = 0.8
-"""The last bone of a finger relative to the one before it, where neither the rig nor the skin shows its end."""
-THUMB_BEHIND: Final = 0.08
-"""How far the thumb's last joint may be behind the knuckles, relative to the length of the palm."""
-RADIUS_SHARES: Final = (0.5, 1.7)
-"""How far a radius from the skin may be from the guess by lengths."""
 
 
-@dataclass
-class Report:
-    """What was found and what was guessed, as sentences."""
+@dataclass(frozen=True, eq=False)
+class ImportedRig:
+    """A rig and the profile of its hands."""
 
-    lines: list[str] = field(default_factory=list)
-
-    def __call__(self, text: str) -> None:
-        self.lines.append(text)
+    profile: HandProfile
+    skeleton: Skeleton
+    unit: float
+    """Metres per unit of the file."""
+    hands: Mapping[Side, RigHand]
+    """The hands that the rig has."""
 
 
 def import_profile(
     path: Path, name: str, model: Hand, say: Callable[[str], None], map_file: Path | None = None
 ) -> HandProfile:
-    """The hands of an avatar. `say` is told what was found and guessed.
+    """The hands of an avatar. `say` receives sentences about what was found and guessed.
+
+    Raises `RigFileError`, and `ProfileError` for a hand that cannot be used.
+    """
+    return import_rig(path, name, model, say, map_file).profile
+
+
+def import_rig(
+    path: Path, name: str, model: Hand, say: Callable[[str], None], map_file: Path | None = None
+) -> ImportedRig:
+    """The hands of an avatar and where they are in its rig. `say` receives what was found and guessed.
 
     Raises `RigFileError`, and `ProfileError` for a hand that cannot be used.
     """
     skeleton = read_skeleton(path)
     maps = map_bones(skeleton, str(path)) if map_file is None else read_map(map_file, skeleton)
     unit = 1.0 if skeleton.in_metres else _unit(skeleton, maps, say)
-    hands = {}
+    hands: dict[Side, RigHand] = {}
     for side in SIDES:
         if side not in maps:
             say(f"{side}: the file has no {side} hand; it will be the mirror image of the other")
             continue
-        hand = _RigHand(skeleton, maps[side], side, unit, model, str(path), say).profile()
-        joints = [None if np.isnan(row).any() else row.tolist() for row in hand.joints]
-        hands[side] = {"joints": joints, "radii": [None if np.isnan(r) else float(r) for r in hand.radii]}
-    return parse_profile({"name": name, **hands})
+        hands[side] = rig_hand(skeleton, maps[side], side, unit, model, str(path), say)
+    described: dict[Side, ProfileHand] = {
+        side: ProfileHand(hand.joints, hand.radii, hand.t_pose, hand.elbow) for side, hand in hands.items()
+    }
+    profile = parse_profile(json.loads(profile_to_json(HandProfile(name, described))))
+    return ImportedRig(profile, skeleton, unit, hands)
 
 
 def _unit(skeleton: Skeleton, maps: dict[Side, BoneMap], say: Callable[[str], None]) -> float:
@@ -68,165 +75,3 @@ def _unit(skeleton: Skeleton, maps: dict[Side, BoneMap], say: Callable[[str], No
         f"the file does not give its unit; {what} are assumed, with which the hand is {length * UNITS[what]:.3f} m long"
     )
     return UNITS[what]
-
-
-class _RigHand:
-    """One hand of a rig, as a right hand in the OpenXR frame of the wrist."""
-
-    def __init__(
-        self,
-        skeleton: Skeleton,
-        bones: BoneMap,
-        side: Side,
-        unit: float,
-        model: Hand,
-        where: str,
-        say: Callable[[str], None],
-    ) -> None:
-        self._skeleton, self._bones, self._side, self._where = skeleton, bones, side, where
-        self._say = lambda text: say(f"{side}: {text}")
-        self._model = model_profile(model, "right")
-        flip = np.array([-1.0, 1.0, 1.0]) if side == "left" else np.ones(3)
-        self._points = unit * (skeleton.heads - skeleton.heads[bones[1]]) * flip
-        self._skin = unit * (skeleton.vertices - skeleton.heads[bones[1]]) * flip
-        self._ends = {k: unit * (end - skeleton.heads[bones[1]]) * flip for k, end in skeleton.ends.items()}
-        turn = self._palm_frame()
-        self._points, self._skin = self._points @ turn, self._skin @ turn
-        self._ends = {k: end @ turn for k, end in self._ends.items()}
-
-    def profile(self) -> ProfileHand:
-        joints, radii = np.full((26, 7), np.nan), np.full(26, np.nan)
-        joints[1] = [0, 0, 0, 0, 0, 0, 1]
-        named = []
-        for row in FINGERS:
-            chain = [k for k in (row if row is FINGERS[0] else row[1:])[:-1] if k in self._bones]
-            if not chain:
-                continue
-            named.append(f"{len(chain)} bones of the {_finger(row)}")
-            self._add_finger(row, chain, joints, radii)
-            if row is not FINGERS[0]:
-                base = (
-                    self._points[self._bones[row[0]]]
-                    if row[0] in self._bones
-                    else METACARPAL_BASE * joints[chain[0], :3]
-                )
-                joints[row[0]] = [*base, 0, 0, 0, 1]
-        knuckles = [joints[row[1]] for row in FINGERS[1:] if not np.isnan(joints[row[1], 0])]
-        middle = joints[12] if not np.isnan(joints[12, 0]) else np.mean(knuckles, axis=0)
-        joints[0] = [*(0.5 * (1.0 + METACARPAL_BASE) * middle[:3]), 0, 0, 0, 1]
-        self._say(f"hand bone {self._skeleton.names[self._bones[1]]}; " + ", ".join(named))
-        if self._side == "left":
-            joints = mirror_poses(joints)
-        return ProfileHand(joints, radii)
-
-    def _palm_frame(self) -> Array:
-        """The rotation to the frame in which the knuckles lie as the model's do (Kabsch's method)."""
-        roots = [row[1] for row in FINGERS[1:] if row[1] in self._bones]
-        if len(roots) < 2:
-            roots += [row[0] for row in FINGERS[:1] if row[0] in self._bones]
-        if len(roots) < 2:
-            raise RigFileError(
-                f"{self._where}: the {self._side} hand has only one finger, so its palm cannot be found; use --map"
-            )
-        ours = np.array([self._points[self._bones[k]] for k in roots])
-        theirs = self._model.joints[roots, :3]
-        u, _, v = np.linalg.svd(ours.T @ theirs)
-        handed = np.sign(np.linalg.det(u @ v))
-        turn = u @ np.diag([1.0, 1.0, handed]) @ v
-        scale = np.linalg.norm(theirs) / np.linalg.norm(ours)
-        error = np.linalg.norm(scale * ours @ turn - theirs, axis=1).max()
-        if error > 0.05:
-            raise RigFileError(
-                f"{self._where}: the knuckles of the {self._side} hand do not lie side by side as on a hand "
-                f"({1000 * error:.0f} mm off); check the names of its bones, or give --map"
-            )
-        return self._palm_up(turn, roots)
-
-    def _palm_up(self, turn: Array, roots: list[int]) -> Array:
-        """The thumb decides between a hand and its mirror image, whose knuckles lie alike."""
-        thumb = [self._bones[k] for k in FINGERS[0] if k in self._bones]
-        if not thumb:
-            return turn
-        tip = self._points[thumb[-1]] @ turn
-        knuckles = np.array([self._points[self._bones[k]] @ turn for k in roots]).mean(axis=0)
-        is_outside, is_behind = tip[0] > knuckles[0], tip[1] > knuckles[1] + THUMB_BEHIND * np.linalg.norm(knuckles)
-        if is_outside or is_behind:
-            raise RigFileError(
-                f"{self._where}: the thumb of the {self._side} hand lies on the wrong side: it is the other hand, or "
-                "a mirrored one; swap the names of the sides, or apply the negative scale in your program"
-            )
-        return turn
-
-    def _add_finger(self, row: tuple[int, ...], chain: list[int], joints: Array, radii: Array) -> None:
-        points = [self._points[self._bones[k]] for k in chain]
-        points.append(self._tip(row, chain, points))
-        lengths = [float(np.linalg.norm(b - a)) for a, b in pairwise(points)]
-        along = (points[1] - points[0]) / max(lengths[0], 1e-9)
-        bends = [
-            np.degrees(np.arccos(np.clip((b - a) @ along / max(n, 1e-9), -1, 1)))
-            for (a, b), n in zip(pairwise(points), lengths, strict=True)
-        ]
-        if max(bends) > 25.0:
-            self._say(f"the {_finger(row)} is bent by {max(bends):.0f} degrees at rest; it is straightened")
-        frame = openxr_frame(along, self._back(chain[0], along))
-        quat, at = matrix_to_quat(frame), points[0]
-        for k, length in zip([*chain, row[-1]], [*lengths, 0.0], strict=True):
-            joints[k] = [*at, *quat]
-            at = at + length * along
-        for n, k in enumerate(chain):
-            radii[k] = self._radius(self._bones[k], points[n], points[n + 1], k)
-        radii[row[-1]] = radii[chain[-1]]
-
-    def _back(self, joint: int, along: Array) -> Array:
-        """The back of a finger: the model's, turned as its bone is."""
-        x, y, z, w = self._model.joints[joint, 3:]
-        theirs_back = np.array([2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)])
-        theirs = -np.array([2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)])
-        axis = np.cross(theirs, along)
-        return (
-            theirs_back
-            + np.cross(axis, theirs_back)
-            + np.cross(axis, np.cross(axis, theirs_back)) / (1.0 + max(theirs @ along, -0.9))
-        )
-
-    def _tip(self, row: tuple[int, ...], chain: list[int], points: list[Array]) -> Array:
-        """Where a finger ends: its tip bone, a child or end of its last bone, its skin, or a guess."""
-        last = self._bones[chain[-1]]
-        if row[-1] in self._bones:
-            return self._points[self._bones[row[-1]]]
-        if last in self._ends and np.linalg.norm(self._ends[last] - points[-1]) > 1e-3:
-            return self._ends[last]
-        for child in self._skeleton.children(last):
-            if np.linalg.norm(self._points[child] - points[-1]) > 1e-3:
-                return self._points[child]
-        before = points[-1] - points[-2] if len(points) > 1 else -np.array([0.0, 0.0, 0.03])
-        unit = before / np.linalg.norm(before)
-        own = self._skin[self._skeleton.owners == last]
-        if len(own) > 8:
-            reach = float(((own - points[-1]) @ unit).max())
-            radius = float(np.median(np.linalg.norm(np.cross(own - points[-1], unit), axis=1)))
-            self._say(f"the {_finger(row)} has no bone at its tip; the end of its skin is taken")
-            return points[-1] + max(reach - radius, 0.3 * float(np.linalg.norm(before))) * unit
-        self._say(f"the end of the {_finger(row)} is guessed from the length of its bone before")
-        return points[-1] + TIP_SHARE * before
-
-    def _radius(self, bone: int, start: Array, end: Array, joint: int) -> float:
-        """The distance of the skin from a bone's axis; NaN, for a guess by lengths, where there is little skin."""
-        along = end - start
-        length = float(np.linalg.norm(along))
-        own = self._skin[self._skeleton.owners == bone] - start
-        at = own @ along / max(length, 1e-9) ** 2
-        middle = own[(at > 0.1) & (at < 0.9)]
-        if len(middle) < 6:
-            return np.nan
-        radius = float(np.median(np.linalg.norm(np.cross(middle, along / length), axis=1)))
-        guess = (
-            self._model.radii[joint]
-            * np.linalg.norm(self._points[self._bones[12 if 12 in self._bones else joint]])
-            / 0.107
-        )
-        return radius if RADIUS_SHARES[0] * guess < radius < RADIUS_SHARES[1] * guess else np.nan
-
-
-def _finger(row: tuple[int, ...]) -> str:
-    return ("thumb", "index finger", "middle finger", "ring finger", "little finger")[FINGERS.index(row)]

@@ -30,11 +30,20 @@ class Skeleton:
     ends: dict[int, Array]
     """Where bones without children end, as far as the file says so."""
     vertices: Array
-    """`(V, 3)`; none in a BVH file."""
+    """`(V, 3)` the skin; a BVH file has none."""
+    faces: NDArray[np.int64]
+    """`(F, 3)`"""
     owners: NDArray[np.int64]
-    """`(V,)` the bone that moves each vertex most."""
+    """`(V, 4)` the bones that move each vertex."""
+    weights: Array
+    """`(V, 4)` how much each of them moves it."""
     in_metres: bool
     """Whether the format has metres as its unit."""
+
+    def main_owners(self) -> NDArray[np.int64]:
+        """The bone that moves each vertex most, `(V,)`."""
+        most = self.weights.argmax(axis=1) if len(self.weights) else np.empty(0, np.int64)
+        return self.owners[np.arange(len(most)), most]
 
     def children(self, bone: int) -> list[int]:
         """The bones that hang on a bone."""
@@ -58,7 +67,8 @@ def read_skeleton(path: Path) -> Skeleton:
 
 def _from_glb(path: Path) -> Skeleton:
     rig = read_glb_rig(path.read_bytes())
-    return Skeleton(rig.names, rig.parents, rig.positions, {}, rig.vertices, rig.owners, in_metres=True)
+    skin = rig.vertices, rig.faces, rig.owners, rig.weights
+    return Skeleton(rig.names, rig.parents, rig.positions, {}, *skin, in_metres=True)
 
 
 def _from_bvh(path: Path) -> Skeleton:
@@ -67,6 +77,6 @@ def _from_bvh(path: Path) -> Skeleton:
     for k, joint in enumerate(joints):
         heads[k] = np.array(joint.offset) + (heads[joint.parent] if joint.parent >= 0 else 0.0)
     ends = {k: heads[k] + np.array(joint.end) for k, joint in enumerate(joints) if joint.end is not None}
-    none = np.empty((0, 3)), np.empty(0, np.int64)
+    no_skin = np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 4), np.int64), np.empty((0, 4))
     names, parents = [joint.name for joint in joints], [joint.parent for joint in joints]
-    return Skeleton(names, parents, heads, ends, *none, in_metres=False)
+    return Skeleton(names, parents, heads, ends, *no_skin, in_metres=False)

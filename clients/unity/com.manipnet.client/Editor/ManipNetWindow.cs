@@ -38,14 +38,19 @@ namespace ManipNet.Client.Unity
             _address = EditorGUILayout.TextField("Server", _address);
             if (_client == null && GUILayout.Button("Test connection")) Connect();
             else if (_client != null && GUILayout.Button("Stop test")) Stop();
-            if (_client != null) Show(_client.GetStats());
+            if (_client != null) ManipNetInspectors.Show(_client.GetStats());
             foreach (ManipNetReceiver receiver in Resources.FindObjectsOfTypeAll<ManipNetReceiver>())
             {
                 EditorGUILayout.Space();
                 EditorGUILayout.LabelField(receiver.name, receiver.Address);
-                Show(receiver.Stats);
+                ManipNetInspectors.Show(receiver);
             }
-            foreach (ManipNetControl control in Resources.FindObjectsOfTypeAll<ManipNetControl>()) Control(control);
+            foreach (ManipNetControl control in Resources.FindObjectsOfTypeAll<ManipNetControl>())
+            {
+                EditorGUILayout.Space();
+                EditorGUILayout.LabelField("Server of " + control.name, control.Address);
+                ManipNetInspectors.Show(control);
+            }
             if (EditorApplication.isPlaying)
                 foreach (ManipNetRecorder recorder in Resources.FindObjectsOfTypeAll<ManipNetRecorder>()) Record(recorder);
             EditorGUILayout.Space();
@@ -54,16 +59,6 @@ namespace ManipNet.Client.Unity
             if (GUILayout.Button("Add hands to the selected character")) SetUp(selected);
             EditorGUI.EndDisabledGroup();
             if (selected == null) EditorGUILayout.HelpBox("Select an object that has an Animator.", MessageType.Info);
-        }
-
-        static void Show(Stats stats)
-        {
-            EditorGUILayout.LabelField("State", stats.State);
-            EditorGUILayout.LabelField("Rate", stats.RateHz.ToString("0.0") + " Hz");
-            EditorGUILayout.LabelField("Age", stats.Received == 0 ? "no message yet" : (1000.0 * stats.AgeS).ToString("0") + " ms");
-            EditorGUILayout.LabelField("Lost, late, refused", stats.Lost + ", " + stats.Late + ", " + stats.Refused);
-            if (stats.Received == 0)
-                EditorGUILayout.HelpBox("Nothing has arrived. Check that the server is running and that this is the address in its line `ready`.", MessageType.Info);
         }
 
         void Connect()
@@ -116,16 +111,6 @@ namespace ManipNet.Client.Unity
             Undo.RecordObject(component, "Set up ManipNet hands");
             change();
             PrefabUtility.RecordPrefabInstancePropertyModifications(component);
-        }
-
-        static void Control(ManipNetControl control)
-        {
-            EditorGUILayout.Space();
-            EditorGUILayout.LabelField(control.name, control.IsBusy ? "waiting for the server" : control.LastReply);
-            if (GUILayout.Button("Record on the server")) control.Record("unity");
-            if (GUILayout.Button("Stop recording on the server")) control.StopRecording();
-            if (GUILayout.Button("Pause the server")) control.Pause(true);
-            if (GUILayout.Button("Continue")) control.Pause(false);
         }
 
         static void Record(ManipNetRecorder recorder)

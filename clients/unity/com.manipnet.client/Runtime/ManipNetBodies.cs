@@ -21,6 +21,10 @@ namespace ManipNet.Client.Unity
     public sealed class ManipNetBodies : MonoBehaviour
     {
         [SerializeField] ManipNetReceiver receiver;
+
+        [Tooltip("Actor whose bodies are shown; empty for the receiver's.")]
+        [SerializeField] string actor = "";
+
         [SerializeField] Prop[] props = new Prop[0];
 
         [Tooltip("Edge in metres of the cube that is shown for a body without a prefab; 0 shows nothing.")]
@@ -35,10 +39,18 @@ namespace ManipNet.Client.Unity
             cube = cubeEdge;
         }
 
+        /// <summary>The actor whose bodies are shown; empty for the receiver's.</summary>
+        public string Actor
+        {
+            get { return actor; }
+            set { actor = value; }
+        }
+
         void LateUpdate()
         {
-            if (receiver == null || !receiver.HasHands) return;
-            HandsFrame hands = receiver.Hands;
+            HandsView view = receiver == null ? null : receiver.Of(actor);
+            if (view == null || !view.HasHands) return;
+            HandsFrame hands = view.Hands;
             for (int i = 0; i < hands.BodyCount; i++)
             {
                 BodyFrame body = hands.Body(i);

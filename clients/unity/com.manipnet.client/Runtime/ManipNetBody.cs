@@ -9,13 +9,25 @@ namespace ManipNet.Client.Unity
     {
         [SerializeField] ManipNetReceiver receiver;
 
+        [Tooltip("Actor whose bodies are shown; empty for the receiver's.")]
+        [SerializeField] string actor = "";
+
+
         [Tooltip("Name of the body in the stream.")]
         [SerializeField] string body = "";
 
+        /// <summary>The actor whose bodies are shown; empty for the receiver's.</summary>
+        public string Actor
+        {
+            get { return actor; }
+            set { actor = value; }
+        }
+
         void LateUpdate()
         {
-            if (receiver == null || !receiver.HasHands) return;
-            HandsFrame hands = receiver.Hands;
+            HandsView view = receiver == null ? null : receiver.Of(actor);
+            if (view == null || !view.HasHands) return;
+            HandsFrame hands = view.Hands;
             for (int i = 0; i < hands.BodyCount; i++)
             {
                 BodyFrame found = hands.Body(i);

@@ -16,6 +16,17 @@ namespace ManipNet.Client.Unity
         [Tooltip("Address `control` in the server's line `ready`.")]
         [SerializeField] string address = "tcp://127.0.0.1:5557";
 
+        [Tooltip("Name of the next recording.")]
+        [SerializeField] string take = "take";
+
+        [Tooltip("Tracked body that gets another object.")]
+        [SerializeField] string body = "";
+
+        [Tooltip("Object of the server's catalogue for the body.")]
+        [SerializeField] string shape = "";
+
+        [SerializeField] float shapeScale = 1f;
+
         readonly object _order = new object();
         volatile string _lastReply = "";
         int _open;
@@ -36,6 +47,44 @@ namespace ManipNet.Client.Unity
         public bool IsBusy
         {
             get { return Volatile.Read(ref _open) > 0; }
+        }
+
+        /// <summary>The name of the next recording, for Record without one and for the buttons.</summary>
+        public string Take
+        {
+            get { return take; }
+            set { take = value; }
+        }
+
+        /// <summary>The tracked body that SelectObject without arguments gives an object.</summary>
+        public string Body
+        {
+            get { return body; }
+            set { body = value; }
+        }
+
+        /// <summary>The object of the server's catalogue that it gets.</summary>
+        public string Shape
+        {
+            get { return shape; }
+            set { shape = value; }
+        }
+
+        /// <summary>The object's scale.</summary>
+        public float ShapeScale
+        {
+            get { return shapeScale; }
+            set { shapeScale = value; }
+        }
+
+        public void Record()
+        {
+            Record(Take);
+        }
+
+        public void SelectObject()
+        {
+            SelectObject(Body, Shape, ShapeScale);
         }
 
         /// <summary>Starts a recording on the server.</summary>
@@ -71,7 +120,16 @@ namespace ManipNet.Client.Unity
 #if UNITY_WEBGL && !UNITY_EDITOR
             _lastReply = "a browser cannot send requests to the control port";
 #else
-            var client = new ControlClient(address);
+            ControlClient client;
+            try
+            {
+                client = new ControlClient(address);
+            }
+            catch (ArgumentException error)
+            {
+                _lastReply = error.Message;
+                return;
+            }
             Interlocked.Increment(ref _open);
             ThreadPool.QueueUserWorkItem(_ => Answer(client, op, fields));
 #endif

@@ -28,6 +28,9 @@ namespace ManipNet.Client.Unity
         [SerializeField] ManipNetReceiver receiver;
         [SerializeField] Side side = Side.Right;
 
+        [Tooltip("Actor whose hand is shown; empty for the receiver's.")]
+        [SerializeField] string actor = "";
+
         [Tooltip("Humanoid whose fingers move. Leave it empty to use bones by name under the root.")]
         [SerializeField] Animator animator;
 
@@ -49,15 +52,37 @@ namespace ManipNet.Client.Unity
         readonly Quat[] _rotations = new Quat[HandRig.BoneCount];
         HandBones _bones;
         HandRig _rig;
+        AvatarRig _avatar;
+        string _avatarProblem;
 
         public void Configure(ManipNetReceiver from, Side which, Animator humanoid, Transform under, WristMode mode)
         {
+            OnDisable();
             receiver = from;
             side = which;
             animator = humanoid;
             root = under;
             wrist = mode;
             if (isActiveAndEnabled) OnEnable();
+        }
+
+        /// <summary>The actor whose hand is shown; empty for the receiver's.</summary>
+        public string Actor
+        {
+            get { return actor; }
+            set { actor = value; }
+        }
+
+        /// <summary>The object under which the rig's bones are.</summary>
+        public Transform Rig
+        {
+            get { return root != null || animator == null ? root : animator.transform; }
+        }
+
+        /// <summary>What the server must know to solve on this hand; null if the bones are not those of a hand.</summary>
+        public HandProfile Profile
+        {
+            get { return _avatar == null ? null : _avatar.Profile; }
         }
 
         public Side Side
@@ -84,9 +109,16 @@ namespace ManipNet.Client.Unity
             get { return _rig == null ? null : _bones; }
         }
 
+        void OnDisable()
+        {
+            if (receiver != null) receiver.Leave(this);
+        }
+
         void OnEnable()
         {
             _rig = null;
+            _avatar = null;
+            _avatarProblem = null;
             if (receiver == null || animator == null && root == null) return;
             try
             {
@@ -98,7 +130,8 @@ namespace ManipNet.Client.Unity
                 return;
             }
             Report(_bones.Missing());
-            if (_bones.Hand != null && _bones.AnyFinger) _rig = Bind();
+            if (_bones.Hand != null && _bones.AnyFinger) Bind();
+            receiver.Join(this);
         }
 
         void Report(List<string> missing)
@@ -111,25 +144,38 @@ namespace ManipNet.Client.Unity
 
         void LateUpdate()
         {
-            if (_rig == null || !receiver.HasHands) return;
-            HandFrame hand = receiver.Hands.Hand(side);
-            if (!hand.Present) return;
-            float weight = receiver.Weight;
-            if (wrist != WristMode.Keep) MoveWrist(hand, weight);
-            _rig.Solve(hand, _rotations);
+            if (_rig == null || receiver == null) return;
+            HandsView solved = receiver.OfAvatar(this);
+            if (receiver.SolveOnAvatar && _avatarProblem != null)
+            {
+                Debug.LogError("ManipNet: " + _avatarProblem, this);
+                _avatarProblem = null;
+            }
+            bool exact = Shows(solved);
+            HandsView view = exact ? solved : receiver.Of(actor); // until the server solves on the avatar, or if it refuses
+            if (!Shows(view)) return;
+            HandFrame hand = view.Hands.Hand(side);
+            if (wrist != WristMode.Keep) MoveWrist(hand, exact, view.Weight);
+            if (exact) _avatar.Solve(hand, _rotations);
+            else _rig.Solve(hand, _rotations);
             Quaternion space = _bones.Hand.rotation;
             for (int i = 0; i < _rotations.Length; i++)
             {
                 if (_bones.Fingers[i] == null) continue;
                 Quaternion turned = space * ManipNetPose.ToUnity(_rotations[i]);
-                _bones.Fingers[i].rotation = Quaternion.Slerp(_bones.Fingers[i].rotation, turned, weight);
+                _bones.Fingers[i].rotation = Quaternion.Slerp(_bones.Fingers[i].rotation, turned, view.Weight);
             }
         }
 
-        void MoveWrist(HandFrame hand, float weight)
+        bool Shows(HandsView view)
         {
-            Vector3 position = ManipNetPose.Position(hand.Wrist, 0);
-            Quaternion rotation = ManipNetPose.ToUnity(_rig.HandRotation(hand));
+            return view != null && view.HasHands && view.Weight > 0f && view.Hands.Hand(side).Present;
+        }
+
+        void MoveWrist(HandFrame hand, bool exact, float weight)
+        {
+            Vector3 position = exact ? ManipNetPose.ToUnity(_avatar.HandPosition(hand)) : ManipNetPose.Position(hand.Wrist, 0);
+            Quaternion rotation = ManipNetPose.ToUnity(exact ? _avatar.HandRotation(hand) : _rig.HandRotation(hand));
             if (wrist == WristMode.Arm) MoveArm(position, rotation, weight);
             else if (wristTarget != null)
             {
@@ -159,45 +205,32 @@ namespace ManipNet.Client.Unity
             hand.rotation = turned;
         }
 
-        HandRig Bind()
+        /// <summary>Prepares both ways to pose the fingers: by rotations alone, and on the avatar's own joints.</summary>
+        void Bind()
         {
-            var positions = new Vec3[HandRig.BoneCount];
-            var rotations = new Quat[HandRig.BoneCount];
-            var present = new bool[HandRig.BoneCount];
-            var tips = new Vec3[HandRig.Fingers.Length];
             var rest = new RestPose(animator);
-            for (int i = 0; i < HandRig.BoneCount; i++)
+            RestHand own = _bones.AtRest(rest, Vector3.one);
+            var tips = new Vec3[HandRig.FingerCount];
+            for (int finger = 0; finger < tips.Length; finger++) tips[finger] = own.HasTip[finger] ? own.Tips[finger] : Continued(own, finger);
+            _rig = new HandRig(side, own.Positions, own.Rotations, tips, correctRestPose, own.Present);
+            try
             {
-                Transform bone = _bones.Fingers[i];
-                if (bone == null) continue;
-                present[i] = true;
-                rotations[i] = RestIn(rest, bone, out positions[i]);
-                tips[i / 3] = End(rest, bone, positions[i], i, positions);
+                _avatar = new AvatarRig(side, _bones.AtRest(rest, _bones.Hand.lossyScale));
             }
-            return new HandRig(side, positions, rotations, tips, correctRestPose, present);
+            catch (ArgumentException error)
+            {
+                _avatarProblem = error.Message;
+            }
         }
 
-        /// <summary>The end of a finger's last bone: its first child, or where the bone before it points.</summary>
-        Vec3 End(RestPose rest, Transform bone, Vec3 position, int index, Vec3[] positions)
+        /// <summary>The end of a finger without a bone there: where the bone before the last one points.</summary>
+        static Vec3 Continued(RestHand rest, int finger)
         {
-            Vec3 end;
-            if (bone.childCount > 0)
-            {
-                RestIn(rest, bone.GetChild(0), out end);
-                return end;
-            }
-            int before = index - 1;
-            while (before >= index - index % 3 && _bones.Fingers[before] == null) before--;
-            return before >= index - index % 3 ? position + (position - positions[before]) : 2f * position;
-        }
-
-        Quat RestIn(RestPose rest, Transform bone, out Vec3 position)
-        {
-            Vector3 at;
-            Quaternion turned;
-            rest.InSpaceOf(_bones.Hand, bone, out at, out turned);
-            position = ManipNetPose.FromUnity(at);
-            return ManipNetPose.FromUnity(turned);
+            int last = 3 * finger + 2, first = 3 * finger;
+            while (last > first && !rest.Present[last]) last--;
+            int before = last - 1;
+            while (before >= first && !rest.Present[before]) before--;
+            return before >= first ? rest.Positions[last] + (rest.Positions[last] - rest.Positions[before]) : 2f * rest.Positions[last];
         }
     }
 }

@@ -12,6 +12,10 @@ namespace ManipNet.Client.Unity
     public sealed class ManipNetJoints : MonoBehaviour
     {
         [SerializeField] ManipNetReceiver receiver;
+
+        [Tooltip("Actor whose hand is shown; empty for the receiver's.")]
+        [SerializeField] string actor = "";
+
         [SerializeField] Side side = Side.Right;
 
         [Tooltip("Object that is shown at every created joint; may be empty.")]
@@ -59,10 +63,18 @@ namespace ManipNet.Client.Unity
             return made.transform;
         }
 
+        /// <summary>The actor whose hand is shown; empty for the receiver's.</summary>
+        public string Actor
+        {
+            get { return actor; }
+            set { actor = value; }
+        }
+
         void LateUpdate()
         {
-            if (receiver == null || !receiver.HasHands || receiver.Weight <= 0f) return;
-            HandFrame hand = receiver.Hands.Hand(side);
+            HandsView view = receiver == null ? null : receiver.Of(actor);
+            if (view == null || !view.HasHands || view.Weight <= 0f) return;
+            HandFrame hand = view.Hands.Hand(side);
             if (!hand.Present) return;
             for (int k = 0; k < _joints.Length; k++)
             {

@@ -1,11 +1,13 @@
 using System;
+using System.Collections.Generic;
 using UnityEngine;
 
 namespace ManipNet.Client.Unity
 {
     /// <summary>
-    /// Receives hands while it is enabled, and computes the pose to show once per frame, before the components that use
-    /// it. It reads ZeroMQ on a thread of its own; in a WebGL build it reads the browser's web socket instead.
+    /// Receives hands while it is enabled, of one actor or of several, and computes the poses to show once per frame, before
+    /// the components that use them. It reads ZeroMQ on threads of its own; in a WebGL build it reads the browser's web
+    /// socket instead.
     /// </summary>
     [AddComponentMenu("ManipNet/ManipNet Receiver")]
     [DefaultExecutionOrder(-100)]
@@ -17,36 +19,72 @@ namespace ManipNet.Client.Unity
         [Tooltip("Address of the web socket in the server's line `ready`. Only WebGL builds use it, because a browser allows no other.")]
         [SerializeField] string webAddress = "ws://127.0.0.1:8081";
 
-        [Tooltip("Actor whose hands are shown; empty for the first one received.")]
+        [Tooltip("Actor whose hands are shown; empty for the first one received. A component may name another actor.")]
         [SerializeField] string actor = "";
 
         [Tooltip("Seconds by which the hands are shown late, to bridge jitter and lost frames. 0.05 is enough on one machine.")]
         [SerializeField, Range(0f, 0.5f)] float delay = 0.1f;
 
-        readonly HandsFrame _hands = new HandsFrame();
-        IHandsClient _client;
+        [Tooltip("The server solves contact on the bones of each character that this receiver drives, so that fingers which touch an object on the performer's hand touch it on the character's too. The wrists must follow the tracked ones (Wrist: Arm). Off: the fingers turn as the performer's do.")]
+        [SerializeField] bool solveOnAvatar;
+
+        [Tooltip("Address `control` in the server's line `ready`, to which the hands of the characters are sent.")]
+        [SerializeField] string controlAddress = "tcp://127.0.0.1:5557";
+
+        readonly Dictionary<string, HandsView> _views = new Dictionary<string, HandsView>();
+        readonly AvatarStreams _avatars = new AvatarStreams();
+        readonly HandsFrame _nothing = new HandsFrame();
         string _connectedTo;
-        float _weight;
 
         /// <summary>
         /// The pose to show in this frame, in the project's axes (right-handed); ManipNetPose converts it.
         /// </summary>
         public HandsFrame Hands
         {
-            get { return _hands; }
+            get
+            {
+                HandsView view = Of("");
+                return view == null ? _nothing : view.Hands;
+            }
         }
 
-        public bool HasHands { get; private set; }
+        public bool HasHands
+        {
+            get
+            {
+                HandsView view = Of("");
+                return view != null && view.HasHands;
+            }
+        }
 
         /// <summary>The weight of the pose, which falls from 1 to 0 when the stream is lost.</summary>
         public float Weight
         {
-            get { return _weight; }
+            get
+            {
+                HandsView view = Of("");
+                return view == null ? 0f : view.Weight;
+            }
         }
 
         public Stats Stats
         {
-            get { return _client == null ? new Stats { State = "off" } : _client.GetStats(); }
+            get
+            {
+                HandsView view = Of("");
+                return view == null ? new Stats { State = "off" } : view.Stats;
+            }
+        }
+
+        /// <summary>All streams that are received: of actors, and of avatars.</summary>
+        public IEnumerable<HandsView> Views
+        {
+            get
+            {
+                foreach (HandsView view in _views.Values)
+                    if (view != null) yield return view; // none if the address is wrong
+                foreach (HandsView view in _avatars.Views) yield return view;
+            }
         }
 
         /// <summary>The address for hands; a new one takes effect in the next frame.</summary>
@@ -54,6 +92,13 @@ namespace ManipNet.Client.Unity
         {
             get { return address; }
             set { address = value; }
+        }
+
+        /// <summary>The address to which hand profiles are sent; a new one takes effect in the next frame.</summary>
+        public string ControlAddress
+        {
+            get { return controlAddress; }
+            set { controlAddress = value; }
         }
 
         /// <summary>The actor whose hands are shown; a new one takes effect in the next frame.</summary>
@@ -70,45 +115,91 @@ namespace ManipNet.Client.Unity
             set { webAddress = value; }
         }
 
-        /// <summary>What the client was made for; it is made anew when that changes, as in the Inspector.</summary>
+        /// <summary>Whether the server solves the hands on the characters' own bones; a change takes effect in the next frame.</summary>
+        public bool SolveOnAvatar
+        {
+            get { return solveOnAvatar; }
+            set { solveOnAvatar = value; }
+        }
+
+        /// <summary>The hands of an actor; an empty name means the receiver's own. Null while the receiver is off.</summary>
+        public HandsView Of(string who)
+        {
+            if (_connectedTo == null) return null;
+            string name = string.IsNullOrEmpty(who) ? actor : who;
+            HandsView view;
+            if (!_views.TryGetValue(name, out view))
+            {
+                IHandsClient client = Connect(name);
+                view = client == null ? null : new HandsView(name, client);
+                _views.Add(name, view);
+            }
+            return view;
+        }
+
+        /// <summary>The hands that the server has solved on the character of `hand`; null if it does not.</summary>
+        public HandsView OfAvatar(ManipNetHand hand)
+        {
+#if UNITY_WEBGL && !UNITY_EDITOR
+            return null; // a browser has no way to the control port
+#else
+            if (!solveOnAvatar || _connectedTo == null || Of(hand.Actor) == null) return null;
+            return _avatars.Of(hand, address, controlAddress, string.IsNullOrEmpty(hand.Actor) ? actor : hand.Actor, delay);
+#endif
+        }
+
+        public void Join(ManipNetHand hand)
+        {
+            _avatars.Join(hand);
+        }
+
+        public void Leave(ManipNetHand hand)
+        {
+            _avatars.Leave(hand);
+        }
+
+        /// <summary>What the clients were made for; they are made anew when that changes, as in the Inspector.</summary>
         string Wanted
         {
-            get { return address + "\n" + webAddress + "\n" + actor; }
+            get { return address + "\n" + webAddress + "\n" + actor + "\n" + controlAddress + "\n" + solveOnAvatar; }
         }
 
         void OnEnable()
         {
             _connectedTo = Wanted;
+            Of("");
+        }
+
+        IHandsClient Connect(string name)
+        {
             try
             {
-                _client = Connect();
+#if UNITY_WEBGL && !UNITY_EDITOR
+                return new WebSocketClient(new BrowserWebSocket(), webAddress, name, delay);
+#else
+                if (solveOnAvatar) new ControlClient(controlAddress); // an address that cannot be right is told at once
+                return new ManipNetClient(address, name, delay);
+#endif
             }
             catch (ArgumentException error)
             {
                 Debug.LogError("ManipNet: " + error.Message, this);
+                return null;
             }
         }
 
-        IHandsClient Connect()
-        {
-#if UNITY_WEBGL && !UNITY_EDITOR
-            return new WebSocketClient(new BrowserWebSocket(), webAddress, actor, delay);
-#else
-            return new ManipNetClient(address, actor, delay);
-#endif
-        }
-
-        /// <summary>Unity also calls this before it reloads scripts, which the thread must not outlive.</summary>
+        /// <summary>Unity also calls this before it reloads scripts, which the threads must not outlive.</summary>
         void OnDisable()
         {
-            if (_client != null) _client.Dispose();
-            _client = null;
-            HasHands = false;
+            foreach (HandsView view in Views) view.Dispose();
+            _views.Clear();
+            _avatars.Clear();
+            _connectedTo = null;
         }
 
         void OnValidate()
         {
-            if (_client != null) _client.DelayS = delay;
+            foreach (HandsView view in Views) view.DelayS = delay;
         }
 
         void LateUpdate()
@@ -118,7 +209,7 @@ namespace ManipNet.Client.Unity
                 OnDisable();
                 OnEnable();
             }
-            HasHands = _client != null && _client.Sample(LocalClock.Now, _hands, out _weight);
+            foreach (HandsView view in Views) view.Update();
         }
     }
 }

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from manipnet.inputs.sender_stats import RATE_S
 from manipnet.wire.text import read_text
 
 MOST_ADDRESSES: Final = 64
@@ -58,10 +59,10 @@ class IgnoredAddress:
 
     def report(self, now_s: float) -> dict[str, object]:
         """As a part of `IgnoredAddresses.report`."""
-        passed_s = self.newest_s - self.first_s
+        passed_s, age_s = self.newest_s - self.first_s, max(now_s - self.newest_s, 0.0)
         return {
             "count": self.count,
-            "rate_hz": (self.count - 1) / passed_s if passed_s > 0.0 else 0.0,
-            "age_s": max(now_s - self.newest_s, 0.0),
+            "rate_hz": (self.count - 1) / passed_s if passed_s > 0.0 and age_s <= RATE_S else 0.0,
+            "age_s": age_s,
             "source": self.source,
         }

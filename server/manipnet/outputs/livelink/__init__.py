@@ -22,7 +22,7 @@ def _open(options: LiveLinkOptions, emission: Emission) -> HandsOutput:
     from manipnet.outputs.livelink.sender import LiveLinkJsonSender
 
     assert options.livelink is not None  # `open_outputs` opens what is turned on
-    return LiveLinkJsonSender(*resolve(*options.livelink))
+    return LiveLinkJsonSender(*resolve(*options.livelink), emission.avatars.values())
 
 
 LIVELINK = Output("livelink", "JSON Live Link over UDP, for Unreal Engine's sample receiver", LiveLinkOptions, _open)

@@ -25,7 +25,7 @@ def _open(options: VmcOptions, emission: Emission) -> HandsOutput:
 
     assert options.vmc is not None  # `open_outputs` opens what is turned on
     host, port = resolve(*options.vmc)
-    return VmcSender(host, port, emission.hand, options.vmc_fingers_only, options.vmc_actor)
+    return VmcSender(host, port, emission.hand, options.vmc_fingers_only, options.vmc_actor, emission.avatars)
 
 
 VMC = Output("vmc", "VMC bones, OSC over UDP, for programs that show avatars", VmcOptions, _open)

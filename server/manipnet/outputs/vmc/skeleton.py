@@ -1,4 +1,4 @@
-"""The poses of a VMC receiver's bones for the pose of a hand.
+"""The poses of a VMC receiver's bones for the pose of the model's hand.
 
 Rotations are local and relative to the receiver's T-pose (arms out, palms down, fingers straight), left-handed, Y up,
 as in Unity. The arms are not tracked, so the hand's rotation is right below an arm in T-pose; where another program
@@ -86,7 +86,7 @@ class VmcSkeleton:
         children = [hand.parents.tolist().index(bone) for bone in _BONES]
         along = self._zero_positions[children] - self._zero_positions[_BONES]
         along /= np.linalg.norm(along, axis=1, keepdims=True)
-        return np.stack([_shortest_turn(*ends) for ends in zip(_T_POSE_DIRECTIONS[_BONES], along, strict=True)])
+        return np.stack([shortest_turn(*ends) for ends in zip(_T_POSE_DIRECTIONS[_BONES], along, strict=True)])
 
     def _t_pose_offsets(self) -> Array:
         """The start of each bone in its parent `(15, 3)`: knuckles where the hand has them, then straight fingers."""
@@ -103,6 +103,9 @@ def _hand_turn(side: Side, hand: HandPose) -> Array:
     return quat_multiply(q, quat_conjugate(_WRIST_TO_T_POSE))
 
 
-def _shortest_turn(start: Array, end: Array) -> Array:
+def shortest_turn(start: Array, end: Array) -> Array:
+    """The rotation about the shortest way from one direction to another; half a turn from one to its opposite."""
     q = np.concatenate([np.cross(start, end), [1.0 + start @ end]])
+    if np.linalg.norm(q) < 1e-6:
+        q = np.append(np.cross(start, np.eye(3)[np.argmin(np.abs(start))]), 0.0)
     return q / np.linalg.norm(q)

@@ -23,7 +23,8 @@ def _open(options: WebSocketOptions, emission: Emission) -> HandsOutput:
 
     token = None if options.web_token is None else read_token(options.web_token)
     is_open = emission.keys is None or token is not None  # browsers have no keys
-    return WebSocketPublisher(emission.telemetry, emission.host if is_open else "127.0.0.1", options.web_port, token)
+    host = emission.host if is_open else "127.0.0.1"
+    return WebSocketPublisher(emission.telemetry, host, options.web_port, token, emission.submit)
 
 
 WEBSOCKET = Output("web", "WebSocket: the `pose/bin` payload, for browsers", WebSocketOptions, _open)

@@ -1,10 +1,13 @@
-"""Publishes hands over WebSocket: each binary message is one `pose/bin` payload, and a slow client skips messages."""
+"""Publishes hands over WebSocket, and takes hand profiles from the clients; `docs/protocol.md` describes the messages.
+
+The path of the address says which hands a client receives. A slow client skips messages.
+"""
 
 import asyncio
 import contextlib
 import re
 import threading
-from collections import deque
+import time
 from collections.abc import Sequence
 from http import HTTPStatus
 
@@ -15,16 +18,16 @@ from websockets.typing import Origin, Subprotocol
 
 from manipnet.net.errors import cannot_listen
 from manipnet.net.half_open import BACKLOG, HalfOpen, handshake_log
-from manipnet.outputs.declaration import EncodedHands, HandsOutput
+from manipnet.outputs.declaration import EncodedHands, HandsOutput, Submit, no_requests
+from manipnet.outputs.websocket.client import AVATAR_PATH, MAX_REQUESTS, Client, answer_to, avatar_of
 from manipnet.outputs.websocket.token import SUBPROTOCOL, shows_token
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 
 MAX_CLIENTS = 32
-QUEUE_LENGTH = 8
-"""Payloads that wait for a client, about an eighth of a second of hands; beyond it, the oldest are dropped."""
 
-MAX_REQUEST_BYTES, MAX_REQUESTS = 1024, 16
-"""Clients have no reason to send anything."""
+MAX_REQUEST_BYTES, MAX_REQUESTS_WAITING = 65_536, 2
+"""A hand profile with all its digits has 10 000 bytes."""
 
 OPEN_S = 5.0
 """A client that has not completed the handshake after this time is cut off."""
@@ -38,13 +41,17 @@ _POLICY_VIOLATION, _TRY_AGAIN_LATER = 1008, 1013
 class WebSocketPublisher(HandsOutput):
     """Serves on a thread of its own, from its creation until `close`."""
 
-    def __init__(self, telemetry: Telemetry, host: str, port: int, token: str | None = None) -> None:
+    def __init__(
+        self, telemetry: Telemetry, host: str, port: int, token: str | None = None, submit: Submit = no_requests
+    ) -> None:
         """Bind the port, of which 0 takes any free one. Raises `ListenError`.
 
-        With a `token`, pages of every origin may connect, and every page and program must show it.
+        With a `token`, pages of every origin may connect, and every page and program must show it. `submit` takes the
+        requests of clients.
         """
-        self._telemetry, self._token = telemetry, token
-        self._clients: dict[asyncio.Event, deque[bytes]] = {}
+        self._telemetry, self._token, self._submit = telemetry, token, submit
+        self._clients: tuple[Client, ...] = ()
+        """Replaced as a whole by the thread of the server, so that other threads can read it."""
         self._loop = asyncio.new_event_loop()
         try:
             self._server = self._loop.run_until_complete(self._serve(host, port))
@@ -66,12 +73,26 @@ class WebSocketPublisher(HandsOutput):
         """Offer one message to every client."""
         return self.publish(hands.binary)
 
-    def publish(self, payload: bytes) -> bool:
-        """Offer one payload to every client and return at once; False if there is none. From any thread."""
-        if not self._clients:
+    def wants(self, avatar: str) -> bool:
+        """Whether a client is connected at the path of the avatar. From any thread."""
+        return any(client.avatar == avatar for client in self._clients)
+
+    def send_avatar(self, hands: EncodedHands, profile: HandProfile) -> bool:
+        """Offer the hands of an avatar to the clients at its path."""
+        if self.wants(profile.name):
+            self.publish(hands.binary, profile.name)
+        return False
+
+    def publish(self, payload: bytes, avatar: str | None = None) -> bool:
+        """Offer one payload to the clients at the path of an avatar, or without one to those of the model's hand.
+
+        Returns at once, with False if there is no such client. From any thread.
+        """
+        clients = [client for client in self._clients if client.avatar == avatar]
+        if not clients:
             return False
         with contextlib.suppress(RuntimeError):  # the loop is closed, since the server is stopping
-            self._loop.call_soon_threadsafe(self._offer, payload)
+            self._loop.call_soon_threadsafe(_offer, payload, clients)
         return True
 
     def close(self) -> None:
@@ -94,6 +115,7 @@ class WebSocketPublisher(HandsOutput):
             process_request=self._check,
             compression=None,
             max_size=MAX_REQUEST_BYTES,
+            max_queue=MAX_REQUESTS_WAITING,
             close_timeout=1,
             open_timeout=OPEN_S,
             backlog=BACKLOG,
@@ -102,52 +124,62 @@ class WebSocketPublisher(HandsOutput):
         )
 
     def _check(self, connection: ServerConnection, request: Request) -> Response | None:
-        if self._token is None or shows_token(request.headers, self._token):
-            return None
-        self._refuse("token")
-        return connection.respond(HTTPStatus.UNAUTHORIZED, "This server asks for its token (--web-token).\n")
+        if self._token is not None and not shows_token(request.headers, self._token):
+            self._refuse("token")
+            return connection.respond(HTTPStatus.UNAUTHORIZED, "This server asks for its token (--web-token).\n")
+        if avatar_of(request.path) == "":
+            return connection.respond(
+                HTTPStatus.NOT_FOUND,
+                f"The path is {AVATAR_PATH}; it must be {AVATAR_PATH}NAME, with a profile's name.\n",
+            )
+        return None
 
     async def _close(self) -> None:
         self._server.close()
         await self._server.wait_closed()
 
-    def _offer(self, payload: bytes) -> None:
-        for news, queue in self._clients.items():
-            queue.append(payload)
-            news.set()
-
     async def _feed(self, connection: ServerConnection) -> None:
         """Send what waits for a client, one payload after another as it takes them."""
+        assert connection.request is not None  # the handshake is complete
         if len(self._clients) >= MAX_CLIENTS:
             self._refuse("too_many")
             await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_CLIENTS} clients")
             return
-        news = asyncio.Event()
-        queue = self._clients[news] = deque[bytes](maxlen=QUEUE_LENGTH)
-        reading = asyncio.create_task(self._ignore(connection, news))
+        client = Client(avatar_of(connection.request.path))
+        self._clients = (*self._clients, client)
+        reading = asyncio.create_task(self._answer(connection, client))
         try:
             while not reading.done():
-                await news.wait()
-                news.clear()
-                while queue:
-                    await connection.send(queue.popleft())
+                await client.wait()
+                while (payload := client.next_payload()) is not None:
+                    await connection.send(payload)
         except ConnectionClosed:
             pass
         finally:
-            del self._clients[news]
+            self._clients = tuple(other for other in self._clients if other is not client)
             reading.cancel()
 
-    async def _ignore(self, connection: ServerConnection, news: asyncio.Event) -> None:
-        """Ignore what a client sends, but notice the end of its connection. Cut off a client that goes on sending."""
-        with contextlib.suppress(ConnectionClosed):
-            for _ in range(MAX_REQUESTS):
-                await connection.recv()
-            self._refuse("endless")
-            await connection.close(_POLICY_VIOLATION, "clients must not send anything")
-        news.set()
+    async def _answer(self, connection: ServerConnection, client: Client) -> None:
+        """Answer the requests of a client until its connection ends. Cut off a client that sends too many."""
+        try:
+            async for message in connection:
+                if not client.may_ask(time.monotonic()):
+                    self._refuse("endless")
+                    await connection.close(_POLICY_VIOLATION, f"at most {MAX_REQUESTS} requests a minute")
+                    break
+                await connection.send(await answer_to(message, self._submit))
+        except ConnectionClosed:
+            pass
+        finally:
+            client.wake()
 
     def _refuse(self, reason: str) -> None:
         self._telemetry.count("connections_refused", reason=reason)
+
+
+def _offer(payload: bytes, clients: Sequence[Client]) -> None:
+    for client in clients:
+        client.offer(payload)
 
 
 def _subprotocol(_: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:

@@ -8,8 +8,9 @@ from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.supervised import Pauses, ReceiverHealth
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
-from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, HandsMessage, encode_binary, encode_msgpack, hand_topics
+from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, hand_topics
 
 MAX_SUBSCRIPTION_BYTES = 1024
 """Subscriptions, and the handshake of CURVE, are all that clients send."""
@@ -53,17 +54,20 @@ class ZmqPublisher(HandsOutput):
         self._read_subscriptions()
         return any(self._is_subscribed(topic) for topic in hand_topics(avatar))
 
-    def send_avatar(self, message: HandsMessage) -> None:
+    def send_avatar(self, hands: EncodedHands, profile: HandProfile) -> bool:
         """Publish the hands of an avatar under those of its topics that have subscribers."""
         if self._retry_s is not None:
-            return
+            return False
         try:
-            for topic, encode in zip(hand_topics(str(message.hand)), (encode_msgpack, encode_binary), strict=True):
-                if self._is_subscribed(topic):
-                    self._bound.socket.send(topic + encode(message))
+            msgpack_topic, binary_topic = hand_topics(profile.name)
+            if self._is_subscribed(msgpack_topic):
+                self._bound.socket.send(msgpack_topic + hands.msgpack)
+            if self._is_subscribed(binary_topic):
+                self._bound.socket.send(binary_topic + hands.binary)
         except zmq.ZMQError as error:
             self._bound.close()
             self._fail(error)
+        return False
 
     def _is_subscribed(self, topic: bytes) -> bool:
         return any(topic.startswith(prefix) for prefix in self._subscribed)

@@ -2,13 +2,15 @@
 
 A profile is a JSON object `{"name": str, "left"|"right": {"joints": [26][7], "radii": [26]}}`. Joints are position (m)
 and quaternion (xyzw) in the frame of that hand's OpenXR wrist joint: -z points to the fingers, +y out of the back of
-the hand. A joint that the avatar lacks is null. `radii` (m) may be missing, as a whole or one by one.
+the hand. A joint that the avatar lacks is null. `radii` (m) may be missing, as a whole or one by one. `t_pose` and
+`elbow` (m) may say where the bones are in the avatar's T-pose, for receivers that show it from there.
 """
 
 import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from manipnet.geometry import SIDES, Array, Side, compose, invert, mirror_poses
+from manipnet.synthesis.hand.shipped_files import hand_file
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES, OPENXR_PARENTS
 
 MAX_NAME_BYTES: Final = 63
@@ -24,7 +27,11 @@ LENGTHS_M: Final = (0.05, 0.6)
 RADII_M: Final = (0.0005, 0.08)
 SAME_PLACE_M: Final = 1e-4
 """A joint this near its parent has no bone before it, so it counts as missing."""
+SAME_LENGTH: Final = 0.02
+"""How much the lengths of bones in `t_pose` and `joints` may differ, relative to them."""
 _HUGE: Final = 1e12
+_REACH_M: Final = 1.5
+_HAND_KEYS: Final = ("joints", "radii", "t_pose", "elbow")
 _COUNT: Final = len(OPENXR_JOINT_NAMES)
 _WRIST: Final = OPENXR_JOINT_NAMES.index("wrist")
 _OTHER: Final[dict[Side, Side]] = {"left": "right", "right": "left"}
@@ -47,6 +54,11 @@ class ProfileHand:
     """`(26, 7)` poses at rest; NaN for a joint that the avatar lacks."""
     radii: Array
     """`(26,)` metres; NaN where they are unknown."""
+    t_pose: Array | None = None
+    """`(26, 3)` where the joints are in the avatar's T-pose, from the wrist, if the avatar faces +z and +y is up; NaN
+    where that is unknown. None for a profile that does not describe the T-pose."""
+    elbow: Array | None = None
+    """`(3,)` the elbow in the T-pose, as `t_pose`; None if it is unknown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +70,8 @@ class HandProfile:
 
 
 def read_profile(path: Path) -> HandProfile:
-    """Read a profile from a JSON file. Raises `ProfileError`, whose text names the file."""
+    """Read a profile from a JSON file, or the shipped one of that name. Raises `ProfileError`, which names the file."""
+    path = hand_file(path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -81,6 +94,8 @@ def profile_to_json(profile: HandProfile) -> str:
         side: {
             "joints": [numbers(row) for row in hand.joints],
             "radii": [None if math.isnan(r) else round(float(r), 6) for r in hand.radii],
+            **({} if hand.t_pose is None else {"t_pose": [numbers(row) for row in hand.t_pose]}),
+            **({} if hand.elbow is None else {"elbow": numbers(hand.elbow)}),
         }
         for side, hand in profile.hands.items()
     }
@@ -100,8 +115,14 @@ def parse_profile(content: Any) -> HandProfile:
     for side in SIDES:
         if side not in hands:
             other = hands[_OTHER[side]]
-            hands[side] = ProfileHand(mirror_poses(other.joints), other.radii)
+            hands[side] = _mirror_image(other)
     return HandProfile(name, {side: hands[side] for side in SIDES})
+
+
+def _mirror_image(hand: ProfileHand) -> ProfileHand:
+    flip = np.array([-1.0, 1.0, 1.0])
+    t_pose = None if hand.t_pose is None else flip * hand.t_pose
+    return ProfileHand(mirror_poses(hand.joints), hand.radii, t_pose, None if hand.elbow is None else flip * hand.elbow)
 
 
 def _name(name: Any) -> str:
@@ -119,15 +140,53 @@ def _name(name: Any) -> str:
 def _hand(side: Side, content: Any) -> ProfileHand:
     if not isinstance(content, Mapping) or "joints" not in content:
         raise ProfileError(f'{side}: must be a map {{"joints", "radii"}}, not {_kind(content)}')
-    if unknown := [str(key) for key in content if key not in ("joints", "radii")]:
-        raise ProfileError(f"{side}: has no {unknown[0]!r}; allowed are joints and radii")
+    if unknown := [str(key) for key in content if key not in _HAND_KEYS]:
+        raise ProfileError(f"{side}: has no {unknown[0]!r}; allowed are {', '.join(_HAND_KEYS)}")
     joints, radii = _joints(side, content["joints"]), _radii(side, content.get("radii"))
     if np.isnan(joints[_WRIST]).any():
         raise ProfileError(f"{side}: the wrist (joint {_WRIST}) is missing; every other joint is given in its frame")
     joints = compose(invert(joints[_WRIST]), joints)
     joints[_duplicates(joints)] = np.nan
     _check_shape(side, joints)
-    return ProfileHand(joints, radii)
+    return ProfileHand(joints, radii, _t_pose(side, content.get("t_pose"), joints), _elbow(side, content.get("elbow")))
+
+
+def _t_pose(side: Side, rows: Any, joints: Array) -> Array | None:
+    if rows is None:
+        return None
+    if not isinstance(rows, (list, tuple)) or len(rows) != _COUNT:
+        raise ProfileError(f"{side}: t_pose must be a list of {_COUNT} positions in OpenXR order, not {_kind(rows)}")
+    places = np.full((_COUNT, 3), np.nan)
+    for k, row in enumerate(rows):
+        if row is not None:
+            places[k] = _position(row, f"{side}: place {k} ({OPENXR_JOINT_NAMES[k]}) of t_pose")
+    for finger in FINGERS:
+        bones = [k for k in (finger[:-1] if finger is FINGERS[0] else finger[1:-1]) if not np.isnan(joints[k, 0])]
+        for k in bones:
+            if np.isnan(places[k, 0]):
+                raise ProfileError(f"{side}: t_pose lacks joint {k} ({OPENXR_JOINT_NAMES[k]}), which joints has")
+        for a, b in pairwise([_WRIST, *bones]):
+            theirs = float(np.linalg.norm(places[b] - (0.0 if a == _WRIST else places[a])))
+            ours = float(np.linalg.norm(joints[b, :3] - joints[a, :3]))
+            if abs(theirs - ours) > SAME_LENGTH * ours:
+                raise ProfileError(
+                    f"{side}: joint {b} ({OPENXR_JOINT_NAMES[b]}) is {theirs:.4g} m from the one before it in t_pose "
+                    f"and {ours:.4g} m in joints; the bones of both must have the same lengths"
+                )
+    return places
+
+
+def _elbow(side: Side, value: Any) -> Array | None:
+    return None if value is None else _position(value, f"{side}: elbow")
+
+
+def _position(value: Any, where: str) -> Array:
+    """Three numbers within a metre and a half, the reach of an arm. Raises `ProfileError`."""
+    if not isinstance(value, (list, tuple)) or len(value) != 3 or not all(map(_is_number, value)):
+        raise ProfileError(f"{where} must be 3 numbers x y z, not {_kind(value)}")
+    if not all(abs(x) <= _REACH_M for x in value):
+        raise ProfileError(f"{where} is {_kind(value)}; positions are in metres from the wrist, at most {_REACH_M:g}")
+    return np.array(value, float)
 
 
 def _joints(side: Side, rows: Any) -> Array:

@@ -92,8 +92,12 @@ class GlbRig:
     """`(N, 3)`"""
     vertices: NDArray[np.float64]
     """`(V, 3)`"""
+    faces: NDArray[np.int64]
+    """`(F, 3)`"""
     owners: NDArray[np.int64]
-    """`(V,)` the node that moves each vertex most."""
+    """`(V, 4)` the nodes that move each vertex."""
+    weights: NDArray[np.float64]
+    """`(V, 4)` how much each of them moves it."""
 
 
 def read_glb_rig(data: bytes) -> GlbRig:
@@ -148,7 +152,8 @@ class _Scene:
         humanoid = _humanoid_names(self._document)
         names = [humanoid.get(n, str(node.get("name", n))) for n, node in enumerate(self._nodes)]
         positions = np.array([self._world(n)[:3, 3] for n in range(len(self._nodes))]).reshape(-1, 3)
-        vertices, owners = [np.empty((0, 3))], [np.empty(0, np.int64)]
+        vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int64)]
+        owners, weights, total = [np.empty((0, 4), np.int64)], [np.empty((0, 4))], 0
         for n, node in enumerate(self._nodes):
             if "skin" not in node or "mesh" not in node:
                 continue
@@ -157,12 +162,14 @@ class _Scene:
                 attributes = primitive["attributes"]
                 if "JOINTS_0" not in attributes or (part := self._primitive(n, primitive, [])) is None:
                     continue
-                numbers = self._accessors.read(attributes["JOINTS_0"], 4).astype(np.int64)
-                most = self._accessors.read(attributes["WEIGHTS_0"], 4).argmax(axis=1)
                 vertices.append(part[0])
-                owners.append(joints[np.take_along_axis(numbers, most[:, None], axis=1)[:, 0]])
+                faces.append(total + part[1])
+                owners.append(joints[self._accessors.read(attributes["JOINTS_0"], 4).astype(np.int64)])
+                weights.append(self._accessors.read(attributes["WEIGHTS_0"], 4))
+                total += len(part[0])
         parents = [self._parents.get(n, -1) for n in range(len(self._nodes))]
-        return GlbRig(names, parents, positions, np.concatenate(vertices), np.concatenate(owners))
+        points, corners = np.concatenate(vertices), np.concatenate(faces)
+        return GlbRig(names, parents, positions, points, corners, np.concatenate(owners), np.concatenate(weights))
 
     def _visible(self) -> list[int]:
         """The nodes of the scene in order, without those that are hidden."""

@@ -11,6 +11,16 @@ namespace UnityEditor
         public void Repaint() { }
     }
 
+    public sealed class CustomEditor : Attribute { public CustomEditor(Type inspectedType) { } }
+
+    public class Editor : UnityEngine.Object
+    {
+        public UnityEngine.Object target { get; set; }
+        public virtual void OnInspectorGUI() { }
+        public virtual bool RequiresConstantRepaint() { return false; }
+        public bool DrawDefaultInspector() { return true; }
+    }
+
     public sealed class MenuItem : Attribute
     {
         public MenuItem(string itemName) { }
@@ -78,7 +88,8 @@ namespace UnityEditor
     {
         public static readonly List<string> Drawn = new List<string>();
         public static string Typed;
-        public static string TextField(string label, string text) { return Typed ?? text; }
+        public static string TextField(string label, string text) { return label == "Server" ? Typed ?? text : text; }
+        public static float FloatField(string label, float value) { return value; }
         public static void LabelField(string label, string text) { Drawn.Add(label + ": " + text); }
         public static void HelpBox(string text, MessageType type) { Drawn.Add(text); }
         public static void Space() { }

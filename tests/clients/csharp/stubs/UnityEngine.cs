@@ -85,14 +85,17 @@ namespace UnityEngine
         public Vector3 localPosition { get { return _local; } set { _local = value; } }
         public Quaternion localRotation { get { return _turn; } set { _turn = value; } }
         public int childCount { get { return _children.Count; } }
+        public Vector3 lossyScale { get { return _parent == null ? localScale : Vector3.Scale(_parent.lossyScale, localScale); } }
+        public bool IsChildOf(Transform parent) { return this == parent || _parent != null && _parent.IsChildOf(parent); }
         public Transform GetChild(int i) { return _children[i]; }
         public void SetParent(Transform parent, bool keepWorld) { _parent = parent; parent._children.Add(this); }
         public IEnumerable<Transform> All() { return new[] { this }.Concat(_children.SelectMany(c => c.All())); }
         public Vector3 position
         {
-            get { return _parent == null ? _local : _parent.position + _parent.rotation * _local; }
-            set { _local = _parent == null ? value : Quaternion.Inverse(_parent.rotation) * (value - _parent.position); }
+            get { return _parent == null ? _local : _parent.position + _parent.rotation * Vector3.Scale(_parent.lossyScale, _local); }
+            set { _local = _parent == null ? value : Divided(Quaternion.Inverse(_parent.rotation) * (value - _parent.position), _parent.lossyScale); }
         }
+        static Vector3 Divided(Vector3 v, Vector3 by) { return new Vector3(v.x / by.x, v.y / by.y, v.z / by.z); }
         public Quaternion rotation
         {
             get { return _parent == null ? _turn : _parent.rotation * _turn; }

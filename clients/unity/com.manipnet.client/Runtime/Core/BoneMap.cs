@@ -1,7 +1,5 @@
 using System;
 using System.Collections.Generic;
-using System.Globalization;
-using System.Text;
 
 namespace ManipNet.Client
 {
@@ -36,7 +34,7 @@ namespace ManipNet.Client
         public static BoneMap Parse(string json)
         {
             var map = new BoneMap();
-            var reader = new Reader(json ?? "");
+            var reader = new JsonReader(json ?? "");
             if (reader.AtEnd) return map;
             bool good = reader.Take('{'), more = good && !reader.Take('}');
             while (more && good)
@@ -59,85 +57,11 @@ namespace ManipNet.Client
         {
             foreach (Side side in new[] { Side.Left, Side.Right })
             {
-                if (RigNames.IsHand(name, side)) return true;
+                if (RigNames.IsHand(name, side) || RigNames.IsMetacarpal(name, side)) return true;
                 for (int bone = 0; bone < HandRig.BoneCount; bone++)
                     if (RigNames.Matches(name, side, bone / 3, bone % 3)) return true;
             }
             return false;
-        }
-
-        /// <summary>Reads the little JSON that a bone map has: one object of texts.</summary>
-        sealed class Reader
-        {
-            readonly string _text;
-
-            public Reader(string text)
-            {
-                _text = text;
-            }
-
-            public int Position { get; private set; }
-
-            public bool AtEnd
-            {
-                get
-                {
-                    while (Position < _text.Length && char.IsWhiteSpace(_text[Position])) Position++;
-                    return Position >= _text.Length;
-                }
-            }
-
-            /// <summary>Skips spaces and takes `wanted` if it comes next.</summary>
-            public bool Take(char wanted)
-            {
-                if (AtEnd || _text[Position] != wanted) return false;
-                Position++;
-                return true;
-            }
-
-            /// <summary>Takes a text, or returns null if none comes next.</summary>
-            public string TakeText()
-            {
-                if (!Take('"')) return null;
-                var value = new StringBuilder();
-                while (Position < _text.Length && _text[Position] != '"')
-                    if (!TakeCharacter(value)) return null;
-                return Position++ < _text.Length && IsWhole(value.ToString()) ? value.ToString() : null;
-            }
-
-            /// <summary>Whether no character beyond 16 bits is cut in half, as by a wrong escape.</summary>
-            static bool IsWhole(string text)
-            {
-                for (int i = 0; i < text.Length; i++)
-                {
-                    if (!char.IsSurrogate(text[i])) continue;
-                    if (i + 1 >= text.Length || !char.IsSurrogatePair(text[i], text[i + 1])) return false;
-                    i++;
-                }
-                return true;
-            }
-
-            bool TakeCharacter(StringBuilder value)
-            {
-                char c = _text[Position++];
-                if (c != '\\')
-                {
-                    value.Append(c);
-                    return true;
-                }
-                char kind = Position < _text.Length ? _text[Position++] : '\0';
-                if (kind != 'u')
-                {
-                    value.Append(kind);
-                    return kind == '"' || kind == '\\' || kind == '/';
-                }
-                int code = 0;
-                if (Position + 4 > _text.Length
-                    || !int.TryParse(_text.Substring(Position, 4), NumberStyles.AllowHexSpecifier, CultureInfo.InvariantCulture, out code)) return false;
-                value.Append((char)code);
-                Position += 4;
-                return true;
-            }
         }
     }
 }

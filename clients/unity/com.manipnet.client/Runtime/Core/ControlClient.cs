@@ -10,7 +10,15 @@ namespace ManipNet.Client
     /// <summary>The server refused a request; the message is the server's own.</summary>
     public sealed class RequestException : Exception
     {
-        public RequestException(string reply) : base(reply) { }
+        /// <param name="reply">The reply in JSON: {"error": "why"}.</param>
+        public RequestException(string reply) : base(Reason(reply)) { }
+
+        static string Reason(string reply)
+        {
+            var reader = new JsonReader(reply);
+            bool error = reader.Take('{') && reader.TakeText() == "error" && reader.Take(':');
+            return (error ? reader.TakeText() : null) ?? reply;
+        }
     }
 
     /// <summary>
@@ -39,7 +47,13 @@ namespace ManipNet.Client
         /// </summary>
         public string Ask(string op, params object[] fields)
         {
-            byte[] body = Encoding.UTF8.GetBytes(Request(op, fields));
+            return AskJson(Request(op, fields));
+        }
+
+        /// <summary>As Ask, with the whole request in JSON.</summary>
+        public string AskJson(string request)
+        {
+            byte[] body = Encoding.UTF8.GetBytes(request);
             IPAddress address;
             IPAddress[] addresses = IPAddress.TryParse(_host, out address) ? new[] { address } : Dns.GetHostAddresses(_host);
             using (Socket socket = new ZmtpSubscriber(1).ConnectToAny(addresses, _host, _port))
@@ -67,7 +81,8 @@ namespace ManipNet.Client
             return Convert.ToDouble(value, CultureInfo.InvariantCulture).ToString("R", CultureInfo.InvariantCulture);
         }
 
-        static string Quoted(string text)
+        /// <summary>A text in JSON, with its quotes.</summary>
+        public static string Quoted(string text)
         {
             var quoted = new StringBuilder("\"");
             foreach (char c in text)

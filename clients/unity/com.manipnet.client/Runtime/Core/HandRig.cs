@@ -8,7 +8,7 @@ namespace ManipNet.Client
     /// </summary>
     public sealed class HandRig
     {
-        public const int BoneCount = 15;
+        public const int BoneCount = 15, FingerCount = 5;
         public static readonly string[] Fingers = { "Thumb", "Index", "Middle", "Ring", "Little" };
         public static readonly string[] Parts = { "Proximal", "Intermediate", "Distal" };
         static readonly int[] Parents = { -1, 0, 1, 2, 3, 0, 5, 6, 0, 8, 9, 0, 11, 12, 0, 14, 15 };

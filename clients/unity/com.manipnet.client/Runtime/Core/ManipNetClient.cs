@@ -1,6 +1,7 @@
 using System;
 using System.IO;
 using System.Net.Sockets;
+using System.Text;
 using System.Threading;
 
 namespace ManipNet.Client
@@ -14,6 +15,7 @@ namespace ManipNet.Client
         const int BackOffMs = 100, BackOffLimitMs = 1000;
         readonly string _host;
         readonly int _port;
+        readonly byte[] _topic;
         readonly ManualResetEvent _stop = new ManualResetEvent(false);
         readonly ZmtpSubscriber _subscriber;
         readonly HandsStream _stream;
@@ -22,8 +24,10 @@ namespace ManipNet.Client
         /// <param name="address">tcp://HOST:PORT</param>
         /// <param name="actor">The actor whose hands are received; empty or null for the first one received.</param>
         /// <param name="delayS">Seconds by which hands are shown late, to bridge jitter and lost frames.</param>
-        public ManipNetClient(string address, string actor = null, double delayS = 0.1)
+        /// <param name="topic">What is subscribed to, with the space at its end.</param>
+        public ManipNetClient(string address, string actor = null, double delayS = 0.1, string topic = Layout.Topic)
         {
+            _topic = Encoding.UTF8.GetBytes(topic);
             ParseAddress(address, out _host, out _port);
             _stream = new HandsStream(actor, delayS);
             _subscriber = new ZmtpSubscriber(Layout.MaxPayloadBytes);
@@ -92,9 +96,9 @@ namespace ManipNet.Client
 
         void Read()
         {
-            _subscriber.Open(_host, _port, Layout.Topic);
+            _subscriber.Open(_host, _port, _topic);
             _stream.Connected();
-            int topic = Layout.Topic.Length;
+            int topic = _topic.Length;
             while (!_subscriber.Stop)
                 if (_subscriber.NextMessage() && HasTopic())
                     _stream.Take(_subscriber.Buffer, _subscriber.MessageStart + topic, _subscriber.MessageLength - topic, LocalClock.Now);
@@ -102,10 +106,9 @@ namespace ManipNet.Client
 
         bool HasTopic()
         {
-            string topic = Layout.Topic;
-            if (_subscriber.MessageLength < topic.Length) return false;
-            for (int i = 0; i < topic.Length; i++)
-                if (_subscriber.Buffer[_subscriber.MessageStart + i] != topic[i]) return false;
+            if (_subscriber.MessageLength < _topic.Length) return false;
+            for (int i = 0; i < _topic.Length; i++)
+                if (_subscriber.Buffer[_subscriber.MessageStart + i] != _topic[i]) return false;
             return true;
         }
     }

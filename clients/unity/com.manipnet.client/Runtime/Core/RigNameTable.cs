@@ -55,5 +55,19 @@ namespace ManipNet.Client
         {
             "rightthumbmetacarpal thumbmetacarpalr rthumbmetacarpal",
         };
+        public static readonly string[] LeftMetacarpals =
+        {
+            "leftindexmetacarpal leftforemetacarpal indexmetacarpall foremetacarpall lindexmetacarpal lforemetacarpal index1basel fore1basel cindex1basel cfore1basel palm01l defpalm01l lcarpal1 metacarpal1l leftsecondmc",
+            "leftmiddlemetacarpal leftmidmetacarpal middlemetacarpall midmetacarpall lmiddlemetacarpal lmidmetacarpal middle1basel mid1basel cmiddle1basel cmid1basel palm02l defpalm02l lcarpal2 metacarpal2l leftthirdmc",
+            "leftringmetacarpal leftthirdmetacarpal ringmetacarpall thirdmetacarpall lringmetacarpal lthirdmetacarpal ring1basel third1basel cring1basel cthird1basel palm03l defpalm03l lcarpal3 metacarpal3l leftfourthmc",
+            "leftlittlemetacarpal leftpinkymetacarpal littlemetacarpall pinkymetacarpall llittlemetacarpal lpinkymetacarpal little1basel pinky1basel clittle1basel cpinky1basel palm04l defpalm04l lcarpal4 metacarpal4l leftfifthmc",
+        };
+        public static readonly string[] RightMetacarpals =
+        {
+            "rightindexmetacarpal rightforemetacarpal indexmetacarpalr foremetacarpalr rindexmetacarpal rforemetacarpal index1baser fore1baser cindex1baser cfore1baser palm01r defpalm01r rcarpal1 metacarpal1r rightsecondmc",
+            "rightmiddlemetacarpal rightmidmetacarpal middlemetacarpalr midmetacarpalr rmiddlemetacarpal rmidmetacarpal middle1baser mid1baser cmiddle1baser cmid1baser palm02r defpalm02r rcarpal2 metacarpal2r rightthirdmc",
+            "rightringmetacarpal rightthirdmetacarpal ringmetacarpalr thirdmetacarpalr rringmetacarpal rthirdmetacarpal ring1baser third1baser cring1baser cthird1baser palm03r defpalm03r rcarpal3 metacarpal3r rightfourthmc",
+            "rightlittlemetacarpal rightpinkymetacarpal littlemetacarpalr pinkymetacarpalr rlittlemetacarpal rpinkymetacarpal little1baser pinky1baser clittle1baser cpinky1baser palm04r defpalm04r rcarpal4 metacarpal4r rightfifthmc",
+        };
     }
 }

@@ -34,6 +34,15 @@ namespace ManipNet.Client
             return Has(side == Side.Left ? RigNameTable.LeftHandBones : RigNameTable.RightHandBones, 0, Plain(bone));
         }
 
+        /// <summary>Whether the name `bone` means a bone in the palm that leads to one of the four fingers.</summary>
+        public static bool IsMetacarpal(string bone, Side side)
+        {
+            string[] rows = side == Side.Left ? RigNameTable.LeftMetacarpals : RigNameTable.RightMetacarpals;
+            for (int row = 0; row < rows.Length; row++)
+                if (Has(rows, row, Plain(bone))) return true;
+            return false;
+        }
+
         static string Word(Side side)
         {
             return side == Side.Left ? "left" : "right";
@@ -45,7 +54,7 @@ namespace ManipNet.Client
         }
 
         /// <summary>The name in lower case, without its namespace and punctuation.</summary>
-        static string Plain(string name)
+        public static string Plain(string name)
         {
             var plain = new StringBuilder();
             foreach (char c in name.Substring(name.LastIndexOf(':') + 1).Normalize(NormalizationForm.FormKC))

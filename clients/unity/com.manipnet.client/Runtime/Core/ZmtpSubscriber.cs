@@ -40,7 +40,7 @@ namespace ManipNet.Client
         public int MessageLength { get; private set; }
 
         /// <summary>Connects and subscribes; throws IOException or SocketException with the reason.</summary>
-        public void Open(string host, int port, string topic)
+        public void Open(string host, int port, byte[] topic)
         {
             _start = _end = _resume = 0;
             _insideMessage = false;
@@ -48,7 +48,7 @@ namespace ManipNet.Client
             _socket = Connect(host, port);
             _socket.NoDelay = true;
             _socket.ReceiveTimeout = _socket.SendTimeout = ConnectMs;
-            Handshake(Encoding.ASCII.GetBytes(topic));
+            Handshake(topic);
         }
 
         Socket Connect(string host, int port)

@@ -1,5 +1,7 @@
 #include "BoneNames.h"
 
+#include <algorithm>
+
 #include "RigNames.h"
 
 namespace manipnet {
@@ -62,9 +64,85 @@ bool IsOneOf(const rig_names::Hand (&table)[N], const std::string& bone, Side si
     return false;
 }
 
+/// The first bone of each plain name.
+using PlainNames = std::map<std::string, int>;
+
+void Add(const std::vector<std::string>& names, const std::string& prefix, PlainNames& byName) {
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        const bool begins = names[i].compare(0, prefix.size(), prefix) == 0;
+        byName.emplace(Plain(begins ? names[i].substr(prefix.size()) : names[i]), static_cast<int>(i));
+    }
+}
+
+/// What all names begin with, up to a punctuation mark, such as the name of the skeleton in Motive.
+std::string Prefix(const std::vector<std::string>& names) {
+    std::vector<std::string> some;
+    for (const std::string& name : names)
+        if (Plain(name).find("hand") != std::string::npos) some.push_back(name);
+    if (some.empty()) some = names;
+    if (some.empty()) return {};
+    const std::string first = *std::min_element(some.begin(), some.end());
+    const std::string last = *std::max_element(some.begin(), some.end());
+    std::size_t same = 0;
+    while (same < first.size() && same < last.size() && first[same] == last[same]) ++same;
+    const std::size_t mark = first.substr(0, same).find_last_of("_:-.");
+    return mark == std::string::npos ? std::string() : first.substr(0, mark + 1);
+}
+
+/// Sets `bone` if the rig has the name and no earlier candidate was found.
+void Take(const PlainNames& byName, const std::string& name, int& bone) {
+    const auto found = byName.find(name);
+    if (bone < 0 && found != byName.end()) bone = found->second;
+}
+
+/// VRM 1 and Godot count the thumb from its metacarpal, and VRChat counts it from zero.
+void CountThumb(const PlainNames& byName, Side side, BoneIndices& found) {
+    int metacarpal = -1;
+    for (const rig_names::Hand& known : rig_names::kThumbMetacarpals)
+        if (known.Side == static_cast<int>(side)) Take(byName, known.Name, metacarpal);
+    const std::string end = side == Side::Left ? "l" : "r";
+    if (metacarpal >= 0 && found.Fingers[0] >= 0) {
+        found.Fingers[1] = found.Fingers[0];
+        found.Fingers[0] = metacarpal;
+    } else if (byName.count("thumb0" + end) > 0) {
+        for (std::size_t part = 0; part < 3; ++part) {
+            int bone = -1;
+            Take(byName, "thumb" + std::to_string(part) + end, bone);
+            if (bone >= 0) found.Fingers[part] = bone;
+        }
+    }
+}
+
+/// The tables list the candidates for a bone with the best first.
+BoneIndices Lookup(const PlainNames& byName, Side side) {
+    BoneIndices found;
+    found.Fingers.fill(-1);
+    found.Metacarpals.fill(-1);
+    for (const rig_names::Hand& known : rig_names::kHands)
+        if (known.Side == static_cast<int>(side)) Take(byName, known.Name, found.Hand);
+    for (const rig_names::Finger& known : rig_names::kFingers)
+        if (known.Side == static_cast<int>(side)) Take(byName, known.Name, found.Fingers[static_cast<std::size_t>(known.Bone)]);
+    for (const rig_names::Finger& known : rig_names::kMetacarpals)
+        if (known.Side == static_cast<int>(side))
+            Take(byName, known.Name, found.Metacarpals[static_cast<std::size_t>(known.Bone) + 1]);
+    CountThumb(byName, side, found);
+    return found;
+}
+
+bool AnyFinger(const BoneIndices& bones) {
+    return std::any_of(bones.Fingers.begin(), bones.Fingers.end(), [](int bone) { return bone >= 0; });
+}
+
 }  // namespace
 
 bool IsThumbMetacarpal(const std::string& bone, Side side) { return IsOneOf(rig_names::kThumbMetacarpals, bone, side); }
+
+bool IsMetacarpal(const std::string& bone, Side side) {
+    const std::string plain = Plain(bone);
+    for (const rig_names::Finger& known : rig_names::kMetacarpals)
+        if (known.Side == static_cast<int>(side) && plain == known.Name) return true;
+    return false;
+}
 
 bool IsHandName(const std::string& bone, Side side) { return IsOneOf(rig_names::kHands, bone, side); }
 
@@ -86,16 +164,12 @@ bool MatchesFinger(const std::string& bone, Side side, std::size_t finger, std::
 
 BoneIndices FindBones(const std::vector<std::string>& names, const std::vector<int>& parents, Side side, const BoneMap& map) {
     const std::vector<std::string> known = Renamed(names, map);
-    BoneIndices found;
-    found.Fingers.fill(-1);
-    bool metacarpal = false;
-    for (const std::string& name : known) metacarpal = metacarpal || IsThumbMetacarpal(name, side);
-    for (std::size_t i = 0; i < known.size(); ++i) {
-        const int index = static_cast<int>(i);
-        if (found.Hand < 0 && IsHandName(known[i], side)) found.Hand = index;
-        for (std::size_t bone = 0; bone < kFingerBones; ++bone)
-            if (found.Fingers[bone] < 0 && MatchesFinger(known[i], side, bone / 3, bone % 3, metacarpal))
-                found.Fingers[bone] = index;
+    PlainNames byName;
+    Add(known, {}, byName);
+    BoneIndices found = Lookup(byName, side);
+    if (!AnyFinger(found) && !AnyFinger(Lookup(byName, side == Side::Left ? Side::Right : Side::Left))) {
+        Add(known, Prefix(known), byName);
+        found = Lookup(byName, side);
     }
     found.LowerArm = ArmAbove(names, parents, found.Hand);
     found.UpperArm = ArmAbove(names, parents, found.LowerArm);

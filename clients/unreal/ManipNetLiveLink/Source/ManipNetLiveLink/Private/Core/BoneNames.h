@@ -15,6 +15,7 @@ struct BoneIndices {
     int LowerArm = -1;
     int UpperArm = -1;
     std::array<int, kFingerBones> Fingers{};
+    std::array<int, kFingers> Metacarpals{};  ///< The bones in the palm, by finger; the thumb has none.
 };
 
 /// A map made by hand: for the name of a bone in any known scheme, as in "LeftHandIndex1", that of the skeleton's bone.
@@ -25,7 +26,8 @@ using BoneMap = std::map<std::string, std::string>;
 std::string ParseBoneMap(const std::string& json, BoneMap& map);
 
 /// Finds the bones of a hand by the names in clients/README.md, and before them those of the map. `parents` holds the
-/// index of each bone's parent, -1 for a root. The arm is that which the hand hangs on.
+/// index of each bone's parent, -1 for a root. The arm is that which the hand hangs on. All names together decide what one
+/// cannot: whether a thumb is counted from its metacarpal or from zero, and which prefix they share, as Motive's do.
 BoneIndices FindBones(const std::vector<std::string>& names, const std::vector<int>& parents, Side side, const BoneMap& map);
 
 /// Whether the name `bone` means this bone of a finger, both counted from zero. A rig with a `thumbMetacarpal` (VRM 1,
@@ -34,6 +36,9 @@ bool MatchesFinger(const std::string& bone, Side side, std::size_t finger, std::
 
 /// Whether the name `bone` means the first bone of a thumb, as in VRM 1 and Godot.
 bool IsThumbMetacarpal(const std::string& bone, Side side);
+
+/// Whether the name `bone` means a bone in the palm that leads to one of the four fingers.
+bool IsMetacarpal(const std::string& bone, Side side);
 
 /// Whether the name `bone` means the hand itself.
 bool IsHandName(const std::string& bone, Side side);

@@ -16,14 +16,14 @@ constexpr int kBackOffLimitMs = 1000;
 
 }  // namespace
 
-Client::Client(const Connection& to, OnFrame arrived)
-    : To(to), Arrived(std::move(arrived)), Subscriber(layout::kMaxPayloadBytes, Stopping) {
+Client::Client(const Connection& to, OnFrame arrived, const std::string& topic)
+    : To(to), Arrived(std::move(arrived)), Topic(topic), Subscriber(layout::kMaxPayloadBytes, Stopping) {
     Frames.DelayS = to.DelayS;
     Thread = std::thread([this] { Run(); });
 }
 
 Client::~Client() {
-    Stop();
+    Client::Stop();
     Thread.join();
 }
 
@@ -83,7 +83,7 @@ void Client::Run() {
 
 /// Reads until the connection breaks, and returns the reason.
 std::string Client::Read() {
-    const std::string error = Subscriber.Open(To.Host, To.Port, layout::kTopic);
+    const std::string error = Subscriber.Open(To.Host, To.Port, Topic);
     if (!error.empty()) return error;
     {
         const std::lock_guard<std::mutex> guard(Lock);
@@ -99,10 +99,10 @@ std::string Client::Read() {
 }
 
 void Client::Take(double arrival) {
-    constexpr std::size_t topic = sizeof layout::kTopic - 1;
+    const std::size_t topic = Topic.size();
     const std::uint8_t* message = Subscriber.Message();
     const std::size_t length = Subscriber.MessageLength();
-    if (length < topic || std::memcmp(message, layout::kTopic, topic) != 0) return;
+    if (length < topic || std::memcmp(message, Topic.data(), topic) != 0) return;
     const std::string error = Decode(message + topic, length - topic, *Spare);
     if (!error.empty()) {
         SetState("message refused: " + error);

@@ -37,19 +37,19 @@ class Client {
 public:
     /// Calls `arrived`, if there is one, for every frame of the actor, on the client's thread.
     using OnFrame = std::function<void(const HandsFrame&)>;
-    explicit Client(const Connection& to, OnFrame arrived = {});
-    ~Client();
+    explicit Client(const Connection& to, OnFrame arrived = {}, const std::string& topic = layout::kTopic);
+    virtual ~Client();
     Client(const Client&) = delete;
     Client& operator=(const Client&) = delete;
 
     /// Computes the hands to show at the time `now` of LocalNow; see Interpolator::Sample.
     bool Sample(double now, HandsFrame& output, float& weight);
-    Stats GetStats() const;
+    virtual Stats GetStats() const;
     void SetDelay(double delayS);
 
     /// Asks the thread to end, without waiting for it; HasStopped tells when the destructor no longer waits.
-    void Stop();
-    bool HasStopped() const { return Stopped; }
+    virtual void Stop();
+    virtual bool HasStopped() const { return Stopped; }
 
 private:
     void Run();
@@ -61,6 +61,7 @@ private:
 
     const Connection To;
     const OnFrame Arrived;
+    const std::string Topic;
     mutable std::mutex Lock;
     std::condition_variable Wake;
     std::atomic<bool> Stopping{false};

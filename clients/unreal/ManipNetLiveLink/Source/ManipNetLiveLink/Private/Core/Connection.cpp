@@ -8,7 +8,7 @@
 namespace manipnet {
 namespace {
 
-constexpr const char* kKeys = "actor=NAME, delay=SECONDS, mode=smooth or raw, yaw=DEGREES, origin=X,Y,Z and scale=FACTOR";
+constexpr const char* kKeys = "actor=NAME, delay=SECONDS, mode=smooth or raw, yaw=DEGREES, origin=X,Y,Z, scale=FACTOR, control=PORT, avatar=PATH and bones=MAP";
 constexpr double kMaxOriginCm = 1e7;
 
 /// Splits a text at spaces outside of double quotes, which it removes.
@@ -80,6 +80,27 @@ std::string ParseMode(const std::string& text, Mode& mode) {
     return {};
 }
 
+std::string ParsePort(const std::string& text, std::uint16_t& port) {
+    double number = 0.0;
+    const char* allowed = "are 1 to 65535";
+    std::string error = ParseNumber("control port", text, 1.0, 65535.0, allowed, number);
+    if (error.empty()) port = static_cast<std::uint16_t>(number);
+    return error;
+}
+
+std::string Replaced(std::string text, const std::string& from, const std::string& to) {
+    for (std::size_t at = text.find(from); at != std::string::npos; at = text.find(from, at + to.size()))
+        text.replace(at, from.size(), to);
+    return text;
+}
+
+/// A setting with a text; one with spaces gets quotes.
+std::string Setting(const char* key, const std::string& text) {
+    if (text.empty()) return {};
+    const bool spaces = text.find_first_of(" \t\r\n") != std::string::npos;
+    return std::string(" ") + key + "=" + (spaces ? "\"" + text + "\"" : text);
+}
+
 std::string ParseSetting(const std::string& word, Connection& to) {
     const std::size_t equals = word.find('=');
     const std::string key = word.substr(0, equals);
@@ -94,6 +115,15 @@ std::string ParseSetting(const std::string& word, Connection& to) {
     if (key == "origin") return ParseOrigin(value, to.Place.Origin);
     if (key == "scale")
         return ParseNumber("scale", value, Connection::kMinScale, Connection::kMaxScale, "are 0.001 to 1000", to.Place.Scale);
+    if (key == "control") return ParsePort(value, to.ControlPort);
+    if (key == "avatar") {
+        to.Avatar = value;
+        return {};
+    }
+    if (key == "bones") {
+        to.AvatarBones = Replaced(Replaced(value, "%22", "\""), "%25", "%");
+        return {};
+    }
     return "\"" + word + "\" is unknown; allowed after the address are " + kKeys;
 }
 
@@ -121,13 +151,16 @@ std::string FormatAddress(const Connection& c) {
 std::string FormatConnection(const Connection& c) {
     const Connection standard;
     std::string text = FormatAddress(c);
-    if (!c.Actor.empty()) text += c.Actor.find(' ') == std::string::npos ? " actor=" + c.Actor : " actor=\"" + c.Actor + "\"";
+    text += Setting("actor", c.Actor);
     if (c.DelayS != standard.DelayS) text += " delay=" + Short(c.DelayS);
     if (c.Delivery == Mode::Raw) text += " mode=raw";
     if (c.Place.YawDegrees != 0.0) text += " yaw=" + Short(c.Place.YawDegrees);
     const Vec& o = c.Place.Origin;
     if (o.X != 0.0 || o.Y != 0.0 || o.Z != 0.0) text += " origin=" + Short(o.X) + "," + Short(o.Y) + "," + Short(o.Z);
     if (c.Place.Scale != 1.0) text += " scale=" + Short(c.Place.Scale);
+    if (c.ControlPort != standard.ControlPort) text += " control=" + std::to_string(c.ControlPort);
+    text += Setting("avatar", c.Avatar);
+    text += Setting("bones", Replaced(Replaced(c.AvatarBones, "%", "%25"), "\"", "%22"));
     return text;
 }
 

@@ -20,6 +20,8 @@ struct RestHand {
     std::array<Quat, kFingerBones> Rotations{};
     std::array<bool, kFingers> HasTip{};
     std::array<Vec, kFingers> Tips{};
+    std::array<bool, kFingers> HasMetacarpal{};  ///< The bones in the palm, by finger; the thumb has none.
+    std::array<Vec, kFingers> Metacarpals{};
 };
 
 /// The rotations of a synthesised hand, and its wrist in the world, in Unreal's axes.
@@ -35,6 +37,7 @@ class HandRig {
 public:
     HandRig() = default;
     HandRig(Side side, const RestHand& rest);
+    HandRig(const Quat& wristToHand, const std::array<Quat, kFingerBones>& bind) : WristToHand(wristToHand), Bind(bind) {}
 
     /// The world rotation of the character's hand bone that follows the tracked wrist.
     Quat HandRotation(const HandPose& hand) const { return hand.WristRotation * Inverse(WristToHand); }

@@ -1,0 +1,142 @@
+"""Scenarios in a real Blender with a real server, run as those of scenarios.py; MANIPNET_CONTROL is its address."""
+
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+
+import os
+
+import bpy
+import numpy as np
+import scenarios
+from manipnet_live.character import Cast
+from manipnet_live.manipnet_client.avatar import TIP_JOINTS
+from manipnet_live.session import session
+from mathutils import Vector
+from rigs import FINGERS, armature
+from scenarios import in_blender, shown, tick, until
+
+CONTROL = os.environ.get("MANIPNET_CONTROL", "")
+NEAR_M = 1e-3
+
+
+def solve_on(rig, follow=True):
+    """Connect with the armature as the avatar, and wait until its hands arrive."""
+    session.start(scenarios.ADDRESS, 0.05, [Cast("", rig, follow, None, True)], CONTROL)
+    until(lambda: session.characters[0].shown and shown("left") and shown("right"))
+
+
+def far_m(rig, side, tail_of):
+    """The largest distance from a fingertip of the rig to where the shown message says."""
+    hand = shown(side)
+    tips = [in_blender(hand.joints[joint]) for joint in TIP_JOINTS]
+    ours = [np.array(rig.matrix_world @ rig.pose.bones[tail_of(finger)].tail) for finger in range(5)]
+    return max(np.linalg.norm(np.array(ours) - np.array(tips), axis=1))
+
+
+def check_tips(rig, tail_of):
+    """For a while, the fingertips lie where the messages say, except while the client bridges a gap in the stream.
+
+    A bridged pose is a mean of two, whose positions no bones of constant lengths can have.
+    """
+    for _ in range(40):
+        tick()
+    far = []
+    for _ in range(60):
+        tick()
+        far += [far_m(rig, side, lambda finger, side=side: tail_of(side, finger)) for side in ("left", "right")]
+    assert np.percentile(far, 75) < NEAR_M, (far, session.problems)
+    assert not session.problems, session.problems
+
+
+def within_reach(rig, left_hand):
+    """Move the armature so that both hands can reach their wrists."""
+    bpy.context.view_layer.update()
+    shoulder = rig.matrix_world @ rig.pose.bones[left_hand].head
+    rig.location += (
+        Vector(in_blender(shown("left").joints[1])) - Vector((0.22, 0.12, 0.0)) - Vector((0, 0, shoulder[2]))
+    )
+
+
+# -- the server solves on the avatar --------------------------------------------------------------------------------
+
+
+def fingertips_of_a_rig_in_centimetres():
+    rig = armature(scale=0.01)
+    solve_on(rig)
+    check_tips(rig, lambda side, finger: f"{side.capitalize()}Hand{FINGERS[finger]}3")
+
+
+def fingertips_of_a_hand_with_a_missing_bone():
+    rig = armature(without=("LeftHandRing3", "RightHandThumb3"))
+    solve_on(rig)
+    for _ in range(40):
+        tick()
+    last = {("left", 3): "LeftHandRing2", ("right", 0): "RightHandThumb2"}
+    for side in ("left", "right"):
+        name_of = lambda f, s=side: last.get((s, f), f"{s.capitalize()}Hand{FINGERS[f]}3")  # noqa: E731
+        assert far_m(rig, side, name_of) < NEAR_M
+
+
+def fingertips_of_rigifys_metarig():
+    bpy.ops.preferences.addon_enable(module="rigify")
+    bpy.ops.object.armature_human_metarig_add()
+    rig = bpy.context.object
+    solve_on(rig)
+    within_reach(rig, "upper_arm.L")
+    check_tips(rig, lambda side, finger: f"{rigify(finger)}.03.{side[0].upper()}")
+
+
+def fingertips_of_a_generated_rig_of_rigify():
+    bpy.ops.preferences.addon_enable(module="rigify")
+    bpy.ops.object.armature_human_metarig_add()
+    bpy.ops.pose.rigify_generate()
+    rig = next(each for each in bpy.data.objects if each.type == "ARMATURE" and each.name != "metarig")
+    solve_on(rig)
+    within_reach(rig, "DEF-upper_arm.L")
+    check_tips(rig, lambda side, finger: f"DEF-{rigify(finger)}.03.{side[0].upper()}")
+
+
+def rigify(finger):
+    return ("thumb", "f_index", "f_middle", "f_ring", "f_pinky")[finger]
+
+
+def fingers_alone_follow_a_wrist_of_the_user():
+    rig = armature(scale=0.01)
+    rig.pose.bones["LeftHand"].rotation_quaternion = (0.8, 0.6, 0.0, 0.0)
+    solve_on(rig, follow=False)
+    for _ in range(20):
+        tick()
+    hand = shown("left")
+    wrist = rig.pose.bones["LeftHand"].matrix
+    place = rig.matrix_world @ wrist
+    ours = [
+        place.to_quaternion().inverted() @ (rig.matrix_world @ bone(rig, f).tail - place.to_translation())
+        for f in range(5)
+    ]
+    theirs = hand.joints[list(TIP_JOINTS), :3] - hand.joints[1, :3]
+    between = lambda points: np.linalg.norm(points[:, None] - points[None], axis=-1)  # noqa: E731
+    assert np.abs(between(np.array(ours)) - between(theirs)).max() < NEAR_M
+
+
+def bone(rig, finger):
+    return rig.pose.bones[f"LeftHand{FINGERS[finger]}3"]
+
+
+def a_refusal_has_the_reason_of_the_server():
+    rig = armature()
+    rig.scale = (10.0, 10.0, 10.0)
+    bpy.context.view_layer.update()
+    session.start(scenarios.ADDRESS, 0.05, [Cast("", rig, True, None, True)], CONTROL)
+    until(lambda: any("m long" in problem for problem in session.problems))
+    assert "refuses the hand profile" in session.problems[0], session.problems
+
+
+def a_stretched_armature_is_refused_with_the_remedy():
+    rig = armature()
+    rig.scale = (1.0, 1.0, 2.0)
+    bpy.context.view_layer.update()
+    with scenarios.refused(scenarios.RigError, "apply its scale"):
+        session.start(scenarios.ADDRESS, 0.05, [Cast("", rig, True, None, True)], CONTROL)
+
+
+if __name__ == "__main__":
+    scenarios.main(globals())
