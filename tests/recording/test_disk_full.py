@@ -37,7 +37,7 @@ def record_until_the_end(folder: Path, log: Path) -> None:
     recorder = Recorder(folder, lambda: ({"session": "s"}, []), Telemetry())
     assert ask(recorder, "record", name="first") == ""
     seq, give_up_s = 0, time.monotonic() + 120.0
-    while recorder._current() is not None:
+    while recorder.current() is not None:
         recorder.note(encode_msgpack(message(seq, seq / 60, 0.1)))
         seq += 1
         time.sleep(1e-3)
