@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from manipnet.common.command_line import Parser
+from manipnet_tools.commands.arguments import parser_for
+from manipnet_tools.commands.verbs import VERBS, options_class
 
 BASH: Final = """\
 _manipnet() {
@@ -60,8 +62,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def candidates(words: Sequence[str]) -> list[str]:
     """What the last of the words, which is not complete yet, may become. Empty where the shell completes files."""
-    from manipnet_tools.cli import VERBS
-
     *before, last = words or [""]
     if not before:
         return _beginning_with(last, [*VERBS, "--help", "--version"])
@@ -83,9 +83,6 @@ def candidates(words: Sequence[str]) -> list[str]:
 
 def _parser(verb: str) -> argparse.ArgumentParser | None:
     """The parser of a verb, or None for an unknown one."""
-    from manipnet_tools.cli import VERBS, options_class
-    from manipnet_tools.commands.arguments import parser_for
-
     if verb not in VERBS:
         return None
     found = VERBS[verb]
