@@ -13,6 +13,7 @@ from checkout import CLIENTS, ROOT, VECTORS, need, publishing
 from languages import run
 from random_hand import posed
 from test_retarget import foreign_rig, shown_directions
+from unity_cutter import Reference, compile_signatures, cut, stubbed_types
 from unity_facts import FACTS, VERSIONS
 
 from manipnet.geometry import quat_multiply, quat_rotate
@@ -63,15 +64,32 @@ def printed(glue):
     return {"address": tcp, "all": done.stdout} | dict(line.split(" ", 1) for line in done.stdout.splitlines())
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_the_engine_has_what_the_package_uses(version):
-    """Looks the facts up in a clone of Unity's reference source."""
+@pytest.fixture(scope="module")
+def reference():
+    """The folder of a clone of Unity's reference source."""
     clone = os.environ.get("MANIPNET_UNITY_REFERENCE")
     if not clone:
         pytest.skip("needs MANIPNET_UNITY_REFERENCE, a clone of github.com/Unity-Technologies/UnityCsReference")
+    return clone
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_engine_has_what_the_package_uses(reference, version):
     for folders, signature in FACTS:
-        command = ["git", "-C", clone, "grep", "-qE", _pattern(signature), version, "--", *folders.split("|")]
+        command = ["git", "-C", reference, "grep", "-qE", _pattern(signature), version, "--", *folders.split("|")]
         assert subprocess.run(command, check=False).returncode == 0, f"{version} lacks {signature}"
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_package_compiles_with_the_signatures_of_the_engine(reference, version, tmp_path):
+    (mcs,) = need("mcs")
+    sources = [path for path in PACKAGE.rglob("*.cs") if not {"XRHands", "Tests"} & set(path.parts)]
+    used = set(re.findall(r"\w+", " ".join(path.read_text(encoding="utf-8") for path in sources)))
+    names = stubbed_types([CSHARP / "stubs" / "UnityEngine.cs", CSHARP / "stubs" / "UnityEditor.cs"])
+    library = compile_signatures(cut(Reference(reference, version), names, used), tmp_path, mcs)
+    options = ["-langversion:7.2", "-warn:4", "-warnaserror", "-nowarn:649", "-r:System.Core", f"-r:{library}"]
+    output = ["-target:library", f"-out:{tmp_path / 'package.dll'}"]
+    subprocess.run([mcs, *options, *output, *map(str, sources)], check=True)
 
 
 def _pattern(signature):
