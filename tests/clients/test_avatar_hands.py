@@ -304,6 +304,31 @@ def test_unreal_source_says_why_it_cannot_solve_on_an_avatar(unreal, stage):
         client.kill()
 
 
+def test_unreal_nodes_control_the_server(unreal, stage):
+    client = unreal_character(unreal, stage.server, avatar_rig("manny"), 1.0)
+    address = stage.server.addresses["control"]
+    assert client.process.stdin is not None
+    assert client.process.stdout is not None
+
+    def ask(words, to=address):
+        client.process.stdin.write(f"request {to} {words}\n")
+        client.process.stdin.flush()
+        return client.process.stdout.readline().rstrip("\n")
+
+    try:
+        pin, reply = ask("pause").split(" ", 1)
+        assert (pin, json.loads(reply)["paused"]) == ("replied", True)
+        assert ask('{"op": "pause", "on": false}').startswith("replied {")
+        assert ask("record").startswith("refused ")
+        assert ask("record").count("--takes") == 1, "the server of this test keeps no takes, and says so"
+        assert 'mug \\"x\\"' in ask("select") or "mug" in ask("select")
+        assert ask("{").startswith("refused ")
+        assert ask("stop", "tcp://127.0.0.1:1") == "refused no server answers at 127.0.0.1:1"
+        assert ask("stop", "udp://x").startswith("refused the address is")
+    finally:
+        client.kill()
+
+
 def last_bone(rest, finger):
     return max(bone for bone in rest.bones if bone // 3 == finger)
 

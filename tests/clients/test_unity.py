@@ -4,6 +4,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -195,6 +196,21 @@ def test_another_actor_in_the_inspector_takes_effect_while_playing(printed):
 
 def test_setting_a_character_up_twice_adds_one_pair_and_can_be_undone(printed):
     assert printed["twice"] == "2 1 True True True"
+
+
+def test_one_receiver_shows_several_actors(glue):
+    command = [sys.executable, str(ROOT / "tests" / "support" / "actors_publisher.py")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as publisher:
+        try:
+            assert publisher.stdout is not None
+            address = publisher.stdout.readline().split()[1]
+            lines = run(glue, address, "actors", "Anna", "Ben")
+        finally:
+            publisher.kill()
+    assert [lines[0], lines[3]] == ["Anna True True", "Ben False True"]
+    for wrist, place in (lines[1:3], lines[4:6]):
+        assert np.linalg.norm(np.array(place.split()[1:], float)) > 0.1
+        np.testing.assert_allclose(np.array(wrist.split()[1:4], float), np.array(place.split()[1:], float), atol=1e-6)
 
 
 def test_package_names_the_modules_that_it_uses():
