@@ -15,6 +15,7 @@ from checkout import VECTORS
 from languages import LiveClient, run
 from live_server import Stage, scene, serving
 from make_hand_profiles import vectors
+from manipnet_client.avatar import AvatarHand, RigHand
 
 from manipnet.geometry import SIDES, Side, quat_conjugate, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity, to_unreal
@@ -50,11 +51,31 @@ def test_the_vectors_are_those_of_the_import():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_profiles_agree_with_those_of_the_import(harness, language, kind):
-    expected = json.loads((VECTORS / "hand_profiles.json").read_text(encoding="utf-8"))[kind]["profile"]
     hands = rests(language, kind)
     lines = run(harness(language), "profile", text="".join(hand.line() + "\n" for hand in hands.values()))
-    for side, line in zip(hands, lines, strict=True):
-        found = json.loads(line)[side]["joints"]
+    agree(kind, {side: json.loads(line)[side]["joints"] for side, line in zip(hands, lines, strict=True)})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_profiles_of_the_python_client_agree_with_those_of_the_import(kind):
+    profiles = {}
+    for side in SIDES:
+        rest = rest_of(avatar_rig(kind), kind, side, lambda pose: pose)
+        rows = [
+            np.array([part.get(k, np.full(width, np.nan)) for k in range(first, count)])
+            for part, width, first, count in (
+                *((rest.positions, 3, 0, 15), (rest.rotations, 4, 0, 15)),
+                *((rest.tips, 3, 0, 5), (rest.metacarpals, 3, 1, 5)),
+            )
+        ]
+        rig = RigHand(rows[0], rows[1], rows[2], metacarpals=rows[3])
+        profiles[side] = AvatarHand(side, rig).content()["joints"]
+    agree(kind, profiles)
+
+
+def agree(kind, profiles):
+    expected = json.loads((VECTORS / "hand_profiles.json").read_text(encoding="utf-8"))[kind]["profile"]
+    for side, found in profiles.items():
         assert [row is None for row in found] == [row is None for row in expected[side]["joints"]]
         ours, theirs = (np.array([row for row in rows if row], float) for rows in (found, expected[side]["joints"]))
         np.testing.assert_allclose(ours[:, :3], theirs[:, :3], atol=AGREEMENT_M)
