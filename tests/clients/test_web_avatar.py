@@ -74,7 +74,7 @@ def test_a_profile_of_a_skinned_hand_is_that_of_the_import(side: str, tmp_path: 
     ours = parse_profile(in_node("profile", f"npm:{where}", json.dumps({"side": side})))
     assert not np.isnan(ours.hands[side].radii[7])
     copy = tmp_path / f"{side}.glb"
-    copy.write_bytes(Path(in_node("path", f"npm:{where}", "{}")["path"]).read_bytes())
+    copy.write_bytes(Path(in_node("path", f"npm:{where}", json.dumps({"side": side}))["path"]).read_bytes())
     compare(ours, import_profile(copy, "hand", shipped_hand(), lambda _: None))
 
 
