@@ -17,6 +17,7 @@ from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
 from manipnet.page.supervisor import LivePage
 from manipnet.recording.recorder import Recorder
+from manipnet.recording.take_notes import TakeNotes
 from manipnet.recording.trigger_listener import TriggerListener
 from manipnet.recording.triggered import TriggeredRecordings
 from manipnet.runtime.mesh_watch import MeshWatch
@@ -51,7 +52,8 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     opened.callback(recorder.stop)
     triggers = TriggeredRecordings(recorder, telemetry)
     opened.callback(triggers.close)
-    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers()}, telemetry)
+    takes = TakeNotes(config.takes, recorder)
+    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers(), **takes.handlers()}, telemetry)
     opened.callback(dispatcher.close)
 
     def submit(request: bytes, reply: Callable[[bytes], object]) -> None:
