@@ -15,7 +15,7 @@ from manipnet.inputs import INPUTS
 from manipnet.runtime.console import Console
 from manipnet.runtime.mailbox import MAX_FRAMES, MAX_REQUESTS, BusyError, Mailbox
 from manipnet.runtime.status import SilenceWatch
-from manipnet.telemetry import DROP_REASONS, LABELS, Recent, RepeatFilter, Telemetry, Timings
+from manipnet.telemetry import DROP_REASONS, LABELS, Recent, Telemetry, Timings
 from manipnet.tracking.tick import BodyHealth
 from manipnet.wire.bodies import BodyFrame
 

@@ -15,6 +15,7 @@ from typing import Final
 import viser
 
 from manipnet.page.frames import Frame
+from manipnet.page.hand_choices import HandChoices, is_avatar
 from manipnet.page.hand_look import HandLook, look_of
 from manipnet.page.panel import Panel
 from manipnet.page.rpc import RefusedError, RpcClient, RpcLog
@@ -49,6 +50,7 @@ class Page:
     def open(self, server: viser.ViserServer) -> None:
         """Set up the scene and let visitors in."""
         self._show = Show(server, self._look, self._follow)
+        self._hands = HandChoices(self._link, self._show)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
 
@@ -58,15 +60,19 @@ class Page:
         for what, content in self._link.incoming():
             if what == "shape":
                 self._show.add_shape(content)
+            elif what == "avatar":
+                self._show.add_avatar(content)
             elif what == "frame":
                 self._show.add_frame(content)
 
     def dropped(self, name: str, content: bytes) -> str:
-        """Import a mesh file that was dropped on the page; returns the message for its visitor."""
+        """Import a mesh or an avatar that was dropped on the page; returns the message for its visitor."""
         panel = next((panel for panel in self._panels.values() if panel.objects is not None), None)
         if panel is None or panel.objects is None:
             return "only a browser on the server's own machine may import files, and none is open"
         try:
+            if is_avatar(name, content):
+                return panel.wear(name, content)
             return panel.objects.import_mesh(name, content)
         except (RefusedError, ValueError, OSError) as error:
             return str(error)
@@ -87,7 +93,7 @@ class Page:
             panel.follow(frames)
 
     async def _connected(self, client: viser.ClientHandle) -> None:
-        self._panels[client.client_id] = Panel(self._link.ask, self._show, client, OPERATOR.get())
+        self._panels[client.client_id] = Panel(self._link.ask, self._show, self._hands, client, OPERATOR.get())
         self._link.watch(True)
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:

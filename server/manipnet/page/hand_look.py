@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
@@ -115,7 +115,7 @@ def _cut(vertices: Array, faces: NDArray) -> tuple[Array, NDArray[np.int32]]:
 
 def _nearest(points: Array, places: Array) -> NDArray[np.int64]:
     """For each of the `places`, the number of the nearest point."""
-    return cKDTree(points).query(places)[1]
+    return np.asarray(KDTree(points).query(places)[1], np.int64)
 
 
 def _boundary(vertices: Array, faces: NDArray) -> NDArray[np.int64]:

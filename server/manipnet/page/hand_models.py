@@ -3,11 +3,10 @@
 from typing import Final
 
 import numpy as np
-import trimesh
 import viser
-from PIL import Image
 
 from manipnet.geometry import Array, matrix_to_quat, mirror_points, mirror_quats
+from manipnet.page.forearm import Forearm
 from manipnet.page.hand_look import HandLook
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
@@ -18,8 +17,6 @@ SKIN: Final = {"right": (226, 168, 138), "left": (213, 153, 128)}
 PALE: Final = {"right": (176, 164, 158), "left": (168, 156, 151)}
 """The colour of a hand that is held or at rest."""
 NAIL: Final = (238, 190, 172)
-RAMP: Final = 64
-"""Steps of opacity in the texture of a forearm."""
 GHOST: Final = (140, 190, 255)
 
 
@@ -53,7 +50,7 @@ class HandModel:
         self._mesh = self._skinned("skin", look.vertices, look.faces, look.weights, positions, quats, SKIN[side])
         self._nails: viser.MeshSkinnedHandle | None = None
         self._nail_bones = np.unique(look.nails.bones)
-        self._cuffs: dict[bool, viser.GlbHandle] = {}
+        self._arm: Forearm | None = None
         if not ghost:
             if len(self._nail_bones):
                 bones = self._nail_bones
@@ -62,7 +59,7 @@ class HandModel:
                 self._nails = self._skinned(
                     "nails", nails.vertices, nails.faces, weights, positions[bones], quats[bones], NAIL
                 )
-            self._cuffs = {pale: self._cuff(pale) for pale in (False, True)}
+            self._arm = self._forearm()
 
     def pose(self, hand: HandPose, wrist: Array | None = None) -> None:
         """Take the pose of a message's hand, at its own wrist or at another `wrist (7,)`."""
@@ -74,14 +71,13 @@ class HandModel:
         if self._nails is not None:
             for bone, number in zip(self._nails.bones, self._nail_bones, strict=True):
                 bone.position, bone.wxyz = positions[number], turned[number]
-        if self._ghost:
+        if self._arm is None:
             return
         if self._pale != (hand.state != "live"):
             self._pale = hand.state != "live"
             self._mesh.color = (PALE if self._pale else SKIN)[self.side]
-            for pale, cuff in self._cuffs.items():
-                cuff.visible = pale == self._pale
-        self._cuffs[self._pale].position, self._cuffs[self._pale].wxyz = positions[0], turned[0]
+            self._arm.paint(self._mesh.color)
+        self._arm.pose(positions[0], turned[0])
 
     def show(self, visible: bool) -> None:
         """Show or hide it."""
@@ -116,31 +112,10 @@ class HandModel:
             receive_shadow=not self._ghost,
         )
 
-    def _cuff(self, pale: bool) -> viser.GlbHandle:
-        """The forearm that fades out, as a child of the wrist, in the colour of the skin."""
+    def _forearm(self) -> Forearm:
         vertices, faces, opacity = self._look.cuff
         _, rotations = forward_kinematics(self._hand, self._hand.skin.bind_angles)
         vertices = vertices @ rotations[0]
         if self.side == "left":
             vertices, faces = mirror_points(vertices), faces[:, ::-1]
-        content = faded_mesh(self.scale * vertices, faces, opacity, (PALE if pale else SKIN)[self.side])
-        name = f"{self._name}/cuff/{'pale' if pale else 'live'}"
-        return self._scene.add_glb(name, content, cast_shadow=False, receive_shadow=False, visible=not pale)
-
-
-def faded_mesh(vertices: Array, faces: np.ndarray, opacity: Array, color: tuple[int, int, int]) -> bytes:
-    """A GLB file with a mesh of one colour, whose vertices have the given opacity."""
-    ramp = np.empty((1, RAMP, 4), np.uint8)
-    ramp[..., :3] = color
-    ramp[..., 3] = np.linspace(0, 255, RAMP).round()
-    material = trimesh.visual.material.PBRMaterial(
-        baseColorTexture=Image.fromarray(ramp), alphaMode="BLEND", metallicFactor=0.0, roughnessFactor=0.6
-    )
-    inset = 0.5 / RAMP
-    across = inset + (1.0 - 2.0 * inset) * opacity
-    visual = trimesh.visual.TextureVisuals(np.column_stack([across, np.full_like(across, 0.5)]), material=material)
-    content = trimesh.Trimesh(vertices, faces, visual=visual, process=False).export(
-        file_type="glb", include_normals=True
-    )
-    assert isinstance(content, bytes)
-    return content
+        return Forearm(self._scene, f"{self._name}/forearm", self.scale * vertices, faces, opacity, SKIN[self.side])

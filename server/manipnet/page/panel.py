@@ -13,6 +13,8 @@ from manipnet.page.controls import Action, Ask
 from manipnet.page.doctor_text import doctor_text
 from manipnet.page.frames import Frame
 from manipnet.page.framing import FollowCamera
+from manipnet.page.hand_choices import HandChoices
+from manipnet.page.hands_tab import HandsTab
 from manipnet.page.markdown import escape
 from manipnet.page.objects_tab import ObjectsTab
 from manipnet.page.refusals import refusals_text
@@ -33,8 +35,9 @@ NARROW_PX: Final = 900
 class Panel:
     """The panel beside the scene. A visitor on the server's own machine is an operator; the others can only watch."""
 
-    def __init__(self, ask: Ask, show: Show, client: viser.ClientHandle, operator: bool) -> None:
-        self._ask, self._show, self._client = ask, show, client
+    def __init__(self, ask: Ask, show: Show, choices: HandChoices, client: viser.ClientHandle, operator: bool) -> None:
+        self._ask, self._show, self._choices, self._client = ask, show, choices, client
+        self._hands: HandsTab | None = None
         self.objects: ObjectsTab | None = None
         self._takes: TakesTab | None = None
         self._calibration: CalibrateTab | None = None
@@ -55,6 +58,8 @@ class Panel:
         if operator:
             with tabs.add_tab("Objects"):
                 self.objects = ObjectsTab(ask, client, self.perform)
+            with tabs.add_tab("Hands"):
+                self._hands = HandsTab(choices, gui, self.perform)
             with tabs.add_tab("Takes"):
                 self._takes = TakesTab(ask, client, self._transport, self.perform)
             with tabs.add_tab("Calibrate"):
@@ -86,6 +91,11 @@ class Panel:
             self._camera.follow(self._show.focus)
         if self.objects is not None:
             self.objects.follow(frames if self._view.recording is None else ())
+
+    def wear(self, name: str, content: bytes) -> str:
+        """Import the hands of an avatar file for the chosen actor. Raises `RefusedError` and `ValueError`."""
+        assert self._hands is not None
+        return self._hands.use(self._choices.add(name, content))
 
     def perform(self, action: Action) -> None:
         """Run an action and notify the visitor of its message or its error."""
@@ -120,6 +130,8 @@ class Panel:
             self.objects.refresh(answer)
             self._calibration.refresh(answer["bodies"])
             self._takes.refresh()
+            if self._hands is not None:
+                self._hands.refresh(status)
 
     @staticmethod
     def _show_is_fresh(history: History, now_s: float) -> bool:

@@ -8,12 +8,14 @@ from typing import Final
 import viser
 
 from manipnet.page.actor_view import Stage
+from manipnet.page.avatar_models import AvatarLook
 from manipnet.page.charts import History
 from manipnet.page.frames import Frame, ShapeView
 from manipnet.page.framing import Focus, focus_of
 from manipnet.page.hand_look import HandLook
 from manipnet.page.overlays import LAYERS, ActorOverlays
 from manipnet.page.scenery import add_lights
+from manipnet.wire import HandsMessage
 
 LIVE: Final = "/live"
 """The node above everything live; a visitor who watches a take hides it for himself."""
@@ -35,6 +37,10 @@ class Show:
         add_lights(server.scene)
         self._stage = Stage(server.scene, LIVE, look)
         self._shapes: dict[str, ShapeView] = {}
+        self._avatars: dict[str, str | None] = {}
+        """The avatar that is shown for each actor."""
+        self._worn: dict[str, HandsMessage] = {}
+        """The newest hands of those avatars, by actor."""
         self._layers: dict[int, frozenset[str]] = {}
         self._overlays: dict[str, ActorOverlays] = {}
         self._drawing, self._arrived = threading.Lock(), threading.Event()
@@ -59,6 +65,18 @@ class Show:
             self._shapes = {name: shape for name, shape in self._shapes.items() if name in used}
         self.histories.setdefault(actor, History()).note(frame.message)
         self._arrived.set()
+
+    def add_avatar(self, message: HandsMessage) -> None:
+        """Take the newest hands of an avatar; they are drawn with the next frame of its actor."""
+        if self._avatars.get(message.actor) == message.hand:
+            self._worn[message.actor] = message
+
+    def show_avatar(self, actor: str, avatar: str | None, look: AvatarLook) -> None:
+        """Show the hands of an avatar instead of the model's for an actor, or with None the model's again."""
+        with self._drawing, self._server.atomic():
+            self._worn.pop(actor, None)
+            self._avatars[actor] = avatar
+            self._stage.wear(actor, look)
 
     def want_layers(self, visitor: int, layers: frozenset[str]) -> None:
         """Draw these keys of `overlays.OVERLAYS` for one visitor; the empty set forgets him."""
@@ -86,7 +104,8 @@ class Show:
                 actor = frame.message.actor
                 if actor not in self._overlays:
                     self._overlays[actor] = ActorOverlays(self._server.scene, LAYERS, actor, self.look)
-                self._stage.show(frame, self._shapes)
+                worn = self._worn.get(actor)
+                self._stage.show(frame, self._shapes, None if worn is None else worn.hands)
                 self._overlays[actor].show(frame, self._shapes, layers)
         self.focus = focus_of(frames)
         self._drawn(frames)

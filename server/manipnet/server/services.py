@@ -15,6 +15,7 @@ from manipnet.net.errors import ListenError
 from manipnet.outputs import open_outputs
 from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
+from manipnet.page.audience import PageAndClients
 from manipnet.page.supervisor import LivePage
 from manipnet.recording.recorder import Recorder
 from manipnet.recording.take_notes import TakeNotes
@@ -63,7 +64,6 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     outputs = open_outputs(config.of, emission)
     publisher = Publisher(outputs, telemetry, recorder.note)
     opened.callback(publisher.close)
-    session.avatars.audience = publisher
     meshes = MeshWatch(session.catalog, session.replace_shape)
     opened.callback(meshes.stop)
     meshes.start()
@@ -73,6 +73,7 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     page_host = LOOPBACK if keys is not None else config.host  # browsers have no keys
     page = LivePage(page_host, config.page_port, dispatcher.submit, telemetry, session.bundle.folder / HAND_FILE)
     opened.callback(page.stop)
+    session.avatars.audience = PageAndClients(publisher, page)
     page.start()
     receivers = make_receivers(
         config.of, session.senders, telemetry, config.host, keys, config.allow, config.body_keys, triggers

@@ -106,7 +106,8 @@ class Session:
             return {**own_hello(request), "addresses": dict(self.addresses)}
 
         def status(request: Request) -> dict[str, Any]:
-            return {**own_status(request), "exposed": self.config.is_exposed}
+            profiles = self._proxy.ask(self.avatars.names)
+            return {**own_status(request), "exposed": self.config.is_exposed, "hand_profiles": profiles}
 
         return {**requests, "hello": hello, **hands, **calibration, **rig, **self.peers.handlers(status)}
 
