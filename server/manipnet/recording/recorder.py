@@ -86,20 +86,7 @@ class Recorder:
         return self._stop_recording({})
 
     def _record(self, request: Request) -> dict[str, Any]:
-        name = request.get("name", time_name())
-        if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise RequestError(
-                f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
-                "not beginning or ending with a space or dot"
-            )
-        if is_device(name):
-            raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
-        path = self._folder / (name.removesuffix(".mcap") + ".mcap")
-        if not is_encodable(path):
-            raise RequestError(
-                f"name is {name!r}, which this system cannot write in its encoding ({sys.getfilesystemencoding()}); "
-                "use ASCII letters, or start the server with PYTHONUTF8=1"
-            )
+        path = recording_path(self._folder, request.get("name", time_name()))
         with self._lock:
             if (recording := self.current()) is not None:
                 raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
@@ -151,6 +138,24 @@ class Recorder:
             "recordings": [path.name for path in files],
             "recording": None if recording is None else {"name": recording.path.name, "seconds": recording.seconds},
         }
+
+
+def recording_path(folder: Path, name: Any) -> Path:
+    """The file of a take in `folder`. Raises `RequestError` for a name that is not allowed on some system."""
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise RequestError(
+            f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
+            "not beginning or ending with a space or dot"
+        )
+    if is_device(name):
+        raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
+    path = folder / (name.removesuffix(".mcap") + ".mcap")
+    if not is_encodable(path):
+        raise RequestError(
+            f"name is {name!r}, which this system cannot write in its encoding ({sys.getfilesystemencoding()}); "
+            "use ASCII letters, or start the server with PYTHONUTF8=1"
+        )
+    return path
 
 
 def _changed_s(path: Path) -> float:

@@ -18,6 +18,7 @@ from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.hand_requests import HandRequests
 from manipnet.control.peers import Peers
 from manipnet.control.request import Handler, Request
+from manipnet.control.rig_requests import RigRequests
 from manipnet.control.session_requests import SessionRequests
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.jit import collection_paused
@@ -99,15 +100,17 @@ class Session:
         ).handlers()
         hands = HandRequests(self._proxy, self.avatars, self.bundle.hand).handlers()
         calibration = CalibrationRequests(self._proxy, self.config.rig).handlers()
+        rig = RigRequests(self._proxy, self.catalog, self.config.rig).handlers()
         own_hello, own_status = requests["hello"], requests["status"]
 
         def hello(request: Request) -> dict[str, Any]:
             return {**own_hello(request), "addresses": dict(self.addresses)}
 
         def status(request: Request) -> dict[str, Any]:
-            return {**own_status(request), "exposed": self.config.is_exposed}
+            profiles = self._proxy.ask(self.avatars.names)
+            return {**own_status(request), "exposed": self.config.is_exposed, "hand_profiles": profiles}
 
-        return {**requests, "hello": hello, **hands, **calibration, **self.peers.handlers(status)}
+        return {**requests, "hello": hello, **hands, **calibration, **rig, **self.peers.handlers(status)}
 
     def replace_shape(self, old: Shape, new: Shape) -> None:
         """Replace a shape in every prop between two ticks. From any thread; raises `RequestError`."""
