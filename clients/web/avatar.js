@@ -2,7 +2,7 @@
 // contact, and the pose of the bones for each message. Needs nothing of three.js but the objects themselves.
 import { FIRST_JOINTS, findHands, JOINTS, TIP_JOINTS } from "./bones.js";
 import { JOINT_COUNT, REST_JOINTS, REST_RADII } from "./layout.js";
-import { add, bestRotation, conjugate, cross, dot, fromTo, multiply, norm, rotate, sub, times, unit } from "./quaternions.js";
+import { add, bestRotation, conjugate, dot, fromTo, multiply, norm, rotate, sub, times, unit } from "./quaternions.js";
 
 const LEVEL = [0, 0, 0, 1];
 const WRIST = 1;
@@ -11,6 +11,7 @@ const TIP_SHARE = 0.8; // the last bone of a finger relative to the one before, 
 const THUMB_BEHIND = 0.08;
 const KNUCKLES_OFF_M = 0.05;
 const RADIUS_SHARES = [0.5, 1.7];
+const PALMAR = 0.6; // cosine of the largest angle between the direction of the palm and that in which a radius is measured
 const MODEL_PALM_M = 0.107;
 const NEAR_M = 1e-3;
 
@@ -117,23 +118,25 @@ class AvatarHand {
   /** The bone at the end of a finger, as Mixamo's fourth ones. */
   #endOf(finger) {
     const last = this.#bones.slice(3 * finger, 3 * finger + 3).findLast((bone) => bone !== null);
-    return last?.children.find((child) => child.isBone && norm(sub(placeOf(child), placeOf(last))) > NEAR_M) ?? null;
+    return last?.children.find((child) => !child.isMesh && norm(sub(placeOf(child), placeOf(last))) > NEAR_M) ?? null;
   }
 
   #addFinger(finger, points, skin, tip, toHand) {
     const rows = [0, 1, 2].map((part) => 3 * finger + part).filter((row) => points[row] !== null);
     if (rows.length === 0) return;
     const heads = rows.map((row) => points[row]);
-    const ends = [...heads.slice(1), tip ?? endBySkin(heads, skin[rows.at(-1)])];
-    const along = unit(sub(ends[0], heads[0]));
     const model = this.#mirrored(REST_JOINTS[JOINTS[rows[0]]].slice(3));
-    const frame = multiply(fromTo(rotate(model, [0, 0, -1]), along), model);
-    let at = heads[0];
+    const ends = [...heads.slice(1), tip ?? endBySkin(heads, skin[rows.at(-1)], model)];
+    const along = unit(sub(ends[0], heads[0]));
+    const frame = boneFrame(along, model);
+    let [at, bent, direction] = [heads[0], frame, along];
     rows.forEach((row, k) => {
       const joint = JOINTS[row];
       const guess = (REST_RADII[joint] * norm(points[6] ?? heads[k])) / MODEL_PALM_M;
       this.#joints[joint] = [...at, ...frame];
-      this.#radii[joint] = radiusOf(skin[row], heads[k], ends[k], guess);
+      bent = multiply(fromTo(direction, sub(ends[k], heads[k])), bent);
+      direction = sub(ends[k], heads[k]);
+      this.#radii[joint] = radiusOf(skin[row], heads[k], ends[k], rotate(bent, [0, -1, 0]), guess);
       const inWrist = multiply(conjugate(this.#toWrist), multiply(toHand, worldRotation(this.#bones[row])));
       this.#bind[row] = multiply(conjugate(frame), multiply(fromTo(sub(ends[k], heads[k]), along), inWrist));
       at = add(at, times(norm(sub(ends[k], heads[k])), along));
@@ -187,27 +190,40 @@ function palmFrame(side, positions) {
   return side === "left" ? [x, -y, -z, w] : [x, y, z, w];
 }
 
+/** The rotation of a joint whose bone points along: the model's, turned by as little as possible. */
+function boneFrame(along, model) {
+  return multiply(fromTo(rotate(model, [0, 0, -1]), along), model);
+}
+
 /** Where a finger ends, by its skin, or by the length of the bone before. */
-function endBySkin(heads, skin) {
+function endBySkin(heads, skin, model) {
   const head = heads.at(-1);
   const before = heads.length > 1 ? sub(head, heads.at(-2)) : [0, 0, -0.03];
   const along = unit(before);
   if (skin.length <= 8) return add(head, times(TIP_SHARE, before));
   const beyond = skin.map((point) => sub(point, head));
-  const radius = median(beyond.map((point) => norm(cross(point, along))));
+  const away = beyond.map((point) => sub(point, times(dot(point, along), along)));
+  const facing = facingPalm(away, rotate(boneFrame(along, model), [0, -1, 0]));
+  const radius = median((facing.length ? facing : away).map(norm));
   const reach = Math.max(...beyond.map((point) => dot(point, along)));
   return add(head, times(Math.max(reach - radius, 0.3 * norm(before)), along));
 }
 
-/** The distance of the skin from a bone; null where there is little skin, or it is not that of a finger. */
-function radiusOf(skin, start, end, guess) {
+/** The distance of the skin from a bone on the palmar side; null where there is little skin, or it is not a finger's. */
+function radiusOf(skin, start, end, palmar, guess) {
   const along = unit(sub(end, start));
   const length = norm(sub(end, start));
   const own = skin.map((point) => sub(point, start));
   const middle = own.filter((point) => dot(point, along) > 0.1 * length && dot(point, along) < 0.9 * length);
-  if (middle.length < 6) return null;
-  const radius = median(middle.map((point) => norm(cross(point, along))));
+  const facing = facingPalm(middle.map((point) => sub(point, times(dot(point, along), along))), palmar);
+  if (middle.length < 6 || facing.length === 0) return null;
+  const radius = median(facing.map(norm));
   return radius > RADIUS_SHARES[0] * guess && radius < RADIUS_SHARES[1] * guess ? radius : null;
+}
+
+/** Those of the vectors from a bone to its skin that point to the palm. */
+function facingPalm(away, palmar) {
+  return away.filter((vector) => dot(vector, palmar) > PALMAR * norm(vector));
 }
 
 function median(values) {

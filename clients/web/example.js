@@ -1,15 +1,21 @@
 // Shows both hands as skin over their WebXR joints, and the tracked bodies. The stream has the axes of three.js:
 // right-handed, Y up, metres. `?server=ws://HOST:PORT` names another server, `#token=…` its token (which, after #, is not
-// sent to the server of the page), and `?mesh=BODY=FILE.obj` the mesh of a body, in metres, once for each body.
+// sent to the server of the page), and `?mesh=BODY=FILE.obj` the mesh of a body, in metres, once for each body. An avatar
+// that is dropped on the page as a GLB or VRM file, or named by `?avatar=FILE` (and `&side=left` for a hand with WebXR's
+// names), is shown with the hands that the server solves on it. Headsets get a button to enter VR.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { OBJLoader } from "three/addons/loaders/OBJLoader.js";
-import { JOINT_NAMES, JOINT_PARENTS, ManipNetClient } from "./manipnet.js";
+import { VRButton } from "three/addons/webxr/VRButton.js";
+import { AvatarHands, JOINT_NAMES, JOINT_PARENTS, ManipNetClient } from "./manipnet.js";
 
 const SIDES = { left: 0x6fb1ff, right: 0xffa46f };
 const parameters = new URLSearchParams(location.search);
 const server = parameters.get("server") ?? "ws://127.0.0.1:8081";
-const client = new ManipNetClient(server, { token: new URLSearchParams(location.hash.slice(1)).get("token") });
+const token = new URLSearchParams(location.hash.slice(1)).get("token");
+let client = new ManipNetClient(server, { token });
+let avatar = null;
 const status = document.getElementById("status");
 
 const renderer = new THREE.WebGLRenderer({ antialias: true });
@@ -113,16 +119,42 @@ function lookAtHands({ left, right }) {
   camera.position.copy(controls.target).add(middle.set(-0.16, 0.48, 0.86).multiplyScalar((1.2 * radius) / half));
 }
 
+/** Shows the avatar of a GLB or VRM file, and lets the server solve on its hands. */
+async function showAvatar(url, name) {
+  try {
+    const { scene: root } = await new GLTFLoader().loadAsync(url);
+    const rig = new AvatarHands(root, { name, side: parameters.get("side") });
+    if (avatar !== null) scene.remove(avatar.root);
+    avatar = { rig, root, sides: rig.sides };
+    root.traverse((part) => (part.frustumCulled = false)); // a skin's bounds are those of its rest pose
+    scene.add(root);
+    client.close();
+    client = globalThis.client = new ManipNetClient(server, { token, hand: rig.profile });
+    problem = "";
+  } catch (error) {
+    problem = `${name} cannot be shown: ${error.message ?? error}`;
+  }
+}
+
+function dropped(event) {
+  event.preventDefault();
+  const file = event.dataTransfer.files[0];
+  if (file === undefined) return;
+  const url = URL.createObjectURL(file);
+  showAvatar(url, file.name.replace(/\.[^.]*$/, "")).finally(() => URL.revokeObjectURL(url));
+}
+
 function describe() {
   const s = client.stats();
-  if (s.received === 0) return `${server}: ${s.state}\nNothing has arrived. Is manipnet-serve running?`;
+  const nothing = s.problem || problem || "Nothing has arrived. Is manipnet-serve running?";
+  if (s.received === 0) return `${server}: ${s.state}\n${nothing}`;
   const sides = Object.keys(SIDES).filter((side) => client.hands[side].present);
   const states = sides.map((side) => {
     const { state, object } = client.hands[side];
     return `${side}: ${state}${object ? `, ${object}` : ""}`;
   });
   const age = `age ${(1000 * s.ageS).toFixed(0)} ms`;
-  return [`${s.state} · ${s.rateHz.toFixed(1)} Hz · ${age} · ${s.lost} lost`, ...states, problem].join("\n");
+  return [`${s.state} · ${s.rateHz.toFixed(1)} Hz · ${age} · ${s.lost} lost`, ...states, s.problem, problem].join("\n");
 }
 
 function resize() {
@@ -132,9 +164,10 @@ function resize() {
 }
 
 function draw() {
-  requestAnimationFrame(draw);
   if (client.sample()) {
-    for (const side of Object.keys(SIDES)) showHand(hands[side], client.hands[side], client.weight);
+    const balls = (side) => (avatar?.sides.includes(side) ? 0 : client.weight);
+    for (const side of Object.keys(SIDES)) showHand(hands[side], client.hands[side], balls(side));
+    if (avatar !== null && client.weight > 0) avatar.rig.show(client.hands);
     for (let i = 0; i < client.hands.bodyCount; i++) showBody(client.hands.bodies[i]);
     lookAtHands(client.hands);
   }
@@ -144,6 +177,13 @@ function draw() {
 
 globalThis.client = client; // for the console
 addEventListener("resize", resize);
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", dropped);
+if (parameters.has("avatar")) showAvatar(parameters.get("avatar"), "avatar");
+if (navigator.xr) {
+  renderer.xr.enabled = true;
+  document.body.append(VRButton.createButton(renderer));
+}
 setInterval(() => (status.textContent = describe()), 250);
 resize();
-draw();
+renderer.setAnimationLoop(draw); // at the rate of the headset, in VR

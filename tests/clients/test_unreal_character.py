@@ -128,7 +128,8 @@ def retarget(tmp_path_factory):
     (compiler,) = need("g++")
     folder = tmp_path_factory.mktemp("character")
     exe = folder / "character"
-    sources = [MODULE / "Private" / "ManipNetRetargetAsset.cpp", *CPP.glob("*.cpp")]
+    own = ("ManipNetRetargetAsset.cpp", "ManipNetSkeletons.cpp")
+    sources = [*(MODULE / "Private" / name for name in own), *CPP.glob("*.cpp")]
     options = ["-pthread", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-o", str(exe)]
     sources = [*sources, ROOT / "tests" / "clients" / "cpp" / "character.cpp"]
     subprocess.run([compiler, *write_headers(folder), *options, *map(str, sources)], check=True)
@@ -138,7 +139,7 @@ def retarget(tmp_path_factory):
         lines += [f"{n} {parent} {_row(p)} {_row(q)} {s}" for n, parent, p, q, s in made.skeleton.bones]
         lod = list(range(len(made.skeleton.bones))) if lod is None else lod
         lines += [str(len(lod)), " ".join(map(str, lod)), str(weight)]
-        (subject,) = json.loads(hand_json("a", side, joints)).values()
+        (subject,) = json.loads(hand_json(f"a_{side}", joints)).values()
         lines += [f"{b['Name']} {b['Parent']} {_row(b['Location'])} {_row(b['Rotation'])}" for b in subject]
         done = subprocess.run(
             [str(exe)], input="\n".join(lines) + "\n", capture_output=True, encoding="utf-8", timeout=60

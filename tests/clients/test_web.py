@@ -19,9 +19,11 @@ def pages(tmp_path):
     for path in (
         "three/build/three.module.js",
         "three/examples/jsm/controls/OrbitControls.js",
+        "three/examples/jsm/loaders/GLTFLoader.js",
         "three/examples/jsm/loaders/OBJLoader.js",
+        "three/examples/jsm/webxr/VRButton.js",
     ):
-        (folder / path).parent.mkdir(parents=True)
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(STUB, folder / path)
     with serving(folder, {CDN: "/three"}) as address:
         yield address
@@ -67,15 +69,22 @@ const packed = JSON.parse(npm("pack", client, "--json"))[0];
 writeFileSync(path.join(project, "package.json"), '{ "type": "module" }');
 npm("install", "./" + packed.filename);
 writeFileSync(path.join(project, "use.ts"), `
-  import { ManipNetClient, JOINT_NAMES, type HandsFrame } from "manipnet-client";
+  import { AvatarHands, ManipNetClient, JOINT_NAMES, type HandProfile, type HandsFrame } from "manipnet-client";
   import { WebSocket } from "ws";
   const client = new ManipNetClient("${address}", { WebSocket: WebSocket as any, delayS: 0.05, token: null });
+  const bare = { name: "none", traverse() {}, updateWorldMatrix() {} };
+  let refused = "";
+  try {
+    const profile: HandProfile = new AvatarHands(bare, { side: "left" }).profile;
+  } catch (error: any) {
+    refused = error.message;
+  }
   const timer = setInterval(() => {
     if (!client.sample() || client.stats().received < 10) return;
     const hands: HandsFrame = client.hands;
     const x: number = hands.left.joints[0];
     const { state } = client.stats();
-    console.log(JSON.stringify({ joints: JOINT_NAMES.length, left: hands.left.present, state, x }));
+    console.log(JSON.stringify({ joints: JOINT_NAMES.length, left: hands.left.present, state, x, refused }));
     clearInterval(timer);
     client.close();
   }, 20);
@@ -101,8 +110,11 @@ def test_the_packed_client_is_typed_and_runs_in_node_with_a_given_websocket():
     packages = ("typescript@5.6.3", "ws@8.18.0", "@types/ws@8.5.13", "@types/node@20.17.10")
     with publishing() as (_, _, websocket):
         result = run_node(PACKED, str(CLIENTS / "web"), websocket, packages=packages)
-    assert {"manipnet.js", "manipnet.d.ts", "README.md", "example.html"} <= set(result["files"])
-    assert result["out"] == {"joints": 26, "left": True, "state": "connected", "x": result["out"]["x"]}
+    files = {"manipnet.js", "avatar.js", "rig-names.js", "manipnet.d.ts", "README.md", "example.html"}
+    assert files <= set(result["files"])
+    shown = {key: result["out"][key] for key in ("joints", "left", "state")}
+    assert shown == {"joints": 26, "left": True, "state": "connected"}
+    assert "bone map" in result["out"]["refused"]
 
 
 def test_joint_names_are_webxr_names():

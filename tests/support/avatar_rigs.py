@@ -14,7 +14,7 @@ from manipnet.geometry import SIDES, Array, Side, quat_conjugate, quat_exp, quat
 from manipnet.synthesis.hand.avatar import model_profile
 from manipnet.synthesis.hand.profile import FINGERS
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet_tools.hands.importing import TIP_SHARE
+from manipnet_tools.hands.rig_hand import TIP_SHARE
 
 WORDS: Final = ("Thumb", "Index", "Middle", "Ring", "Pinky")
 KINDS: Final = ("mixamo", "manny", "metahuman", "cartoon", "vrm1", "motive")

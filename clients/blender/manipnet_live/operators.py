@@ -149,6 +149,67 @@ class MANIPNET_OT_save_bone_map(_OfCharacter, bpy.types.Operator, ExportHelper):
         return {"FINISHED"}
 
 
+class _OfServer:
+    """An operator that sends the server a request."""
+
+    @classmethod
+    def poll(cls, context):
+        return session.remote is not None
+
+    def send(self, op: str, **fields):
+        session.remote.send(op, **fields)
+        return {"FINISHED"}
+
+
+class MANIPNET_OT_record_on_server(_OfServer, bpy.types.Operator):  # noqa: N801  (Blender requires such names)
+    """Record a take on the server's machine. Press again to end it"""
+
+    bl_idname = "manipnet.record_on_server"
+    bl_label = "Record on Server"
+
+    def execute(self, context):
+        if session.remote.state.recording is not None:
+            return self.send("stop_recording")
+        name = context.scene.manipnet.take_name
+        return self.send("record", **({"name": name} if name else {}))
+
+
+def _objects(_self, _context):
+    """The items of a menu with the server's objects; Blender requires that the texts stay in memory."""
+    global _items
+    names = session.remote.state.objects if session.remote is not None else ()
+    _items = [(name, name, "") for name in names] or [("", "No objects", "")]
+    return _items
+
+
+_items: list[tuple[str, str, str]] = []
+
+
+class MANIPNET_OT_select_object(_OfServer, bpy.types.Operator):  # noqa: N801  (Blender requires such names)
+    """Choose the object that this body carries"""
+
+    bl_idname = "manipnet.select_object"
+    bl_label = "Object"
+    actor: bpy.props.StringProperty(options={"HIDDEN"})
+    body: bpy.props.StringProperty(options={"HIDDEN"})
+    object: bpy.props.EnumProperty(name="Object", items=_objects)
+
+    def execute(self, context):
+        return self.send("select_object", body=self.body, object=self.object, actor=self.actor)
+
+
+class MANIPNET_OT_rest(_OfServer, bpy.types.Operator):  # noqa: N801  (Blender requires such names)
+    """Let the hands of all actors ease to the rest pose"""
+
+    bl_idname = "manipnet.rest"
+    bl_label = "Rest"
+
+    def execute(self, context):
+        for actor in list(session.remote.state.bodies) or [None]:
+            self.send("rest", **({"actor": actor} if actor else {}))
+        return {"FINISHED"}
+
+
 def _make_keyframes(operator, context) -> None:
     """End a running recording by the scene's settings, and report what became of it."""
     if not session.is_recording:
@@ -170,4 +231,7 @@ OPERATORS = (
     MANIPNET_OT_find_bones,
     MANIPNET_OT_load_bone_map,
     MANIPNET_OT_save_bone_map,
+    MANIPNET_OT_record_on_server,
+    MANIPNET_OT_select_object,
+    MANIPNET_OT_rest,
 )

@@ -27,6 +27,7 @@ class MANIPNET_PT_panel(bpy.types.Panel):  # noqa: N801  (Blender requires such 
             layout.operator("manipnet.disconnect", icon="PAUSE")
             _draw_recording(layout, chosen)
             _draw_status(layout)
+            _draw_server(layout.box(), chosen)
         else:
             layout.operator("manipnet.connect", icon="PLAY")
         for problem in session.problems:
@@ -67,3 +68,27 @@ def _draw_status(layout) -> None:
             layout.label(text=f"{stats.rate_hz:.1f} Hz, age {1000 * stats.age_s:.0f} ms, {stats.lost} lost")
         else:
             layout.label(text="Nothing has arrived. Is the server running?", icon="INFO")
+
+
+def _draw_server(box, chosen) -> None:
+    """What the panel can ask of the server."""
+    remote = session.remote
+    if remote is None:
+        return
+    if remote.problem:
+        box.label(text=remote.problem, icon="ERROR")
+        return
+    recording = remote.state.recording is not None
+    box.prop(chosen, "take_name")
+    text = "Stop Recording on Server" if recording else "Record on Server"
+    box.operator("manipnet.record_on_server", text=text, icon="REC", depress=recording)
+    for actor, bodies in remote.state.bodies.items():
+        for body, carried in bodies.items():
+            row = box.row()
+            row.label(text=f"{actor}: {body}" if len(remote.state.bodies) > 1 else body)
+            menu = row.operator_menu_enum("manipnet.select_object", "object", text=carried["object"] or "Object")
+            menu.actor, menu.body = actor, body
+    box.prop(chosen, "look_ahead")
+    box.operator("manipnet.rest", icon="HAND")
+    if remote.message:
+        box.label(text=remote.message, icon="INFO")

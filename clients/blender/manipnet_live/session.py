@@ -12,6 +12,7 @@ from .manipnet_client import Stats
 from .manipnet_client.zmtp import parse_address
 from .props import Props
 from .recording import Bake, Recording, Track
+from .remote import Remote
 from .timecode import timecode_frames
 
 SHOW_EVERY_S = 1.0 / 60.0
@@ -26,6 +27,8 @@ class Session:
         self.characters: list[Character] = []
         self.problem = ""
         """Why the last session ended, if an error ended it."""
+        self.remote: Remote | None = None
+        """Sends requests to the server while the clients are connected."""
         self._props: Props | None = None
         self._recording: Recording | None = None
         self._prop_tracks: list[Track] = []
@@ -75,6 +78,7 @@ class Session:
             for each in cast or (Cast(),):
                 started.append(Character(address, control_address, delay_s, each))
             self._props = Props(control_address) if props else None
+            self.remote = Remote(control_address)
         except ValueError:
             for character in started:
                 character.close()
@@ -143,12 +147,15 @@ class Session:
         self._stop_recording()
         characters, self.characters = self.characters, []
         props, self._props = self._props, None
+        remote, self.remote = self.remote, None
         if bpy.app.timers.is_registered(self._tick):
             bpy.app.timers.unregister(self._tick)
         for character in characters:
             character.close()
         if props is not None:
             props.close()
+        if remote is not None:
+            remote.close()
 
     def _stop_recording(self) -> None:
         self._recording, self._prop_tracks = None, []

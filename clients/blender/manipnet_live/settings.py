@@ -4,7 +4,12 @@ import bpy
 
 from .bones import ALL_PARTS
 from .character import Cast
-from .session import CONTROL
+from .session import CONTROL, session
+
+
+def _send_look_ahead(chosen, _) -> None:
+    if session.remote is not None:
+        session.remote.send("look_ahead", seconds=chosen.look_ahead)
 
 
 class ManipNetBone(bpy.types.PropertyGroup):
@@ -68,6 +73,18 @@ class Settings(bpy.types.PropertyGroup):
     )
     show_props: bpy.props.BoolProperty(name="Props", description="Show the tracked bodies, with the meshes of props")
     characters: bpy.props.CollectionProperty(type=ManipNetCharacter)
+    take_name: bpy.props.StringProperty(
+        name="Take", description="Name of the next recording on the server's machine; empty for the date and time"
+    )
+    look_ahead: bpy.props.FloatProperty(
+        name="Look-ahead",
+        default=0.5,
+        min=0.0,
+        max=0.5,
+        unit="TIME_ABSOLUTE",
+        description="Future motion that the server waits for: more is better, less is sooner. Sent when it is changed",
+        update=_send_look_ahead,
+    )
     start_at: bpy.props.EnumProperty(
         name="Start",
         items=(

@@ -33,6 +33,8 @@ _TIP_SHARE = 0.8
 _THUMB_BEHIND = 0.08
 _KNUCKLES_OFF_M = 0.05
 _RADIUS_SHARES = (0.5, 1.7)
+_PALMAR = 0.6
+"""Cosine of the largest angle between the direction of the palm and that in which a radius is measured."""
 _MODEL_PALM_M = 0.107
 _MIDDLE_KNUCKLE, _KNUCKLES = 6, (3, 6, 9, 12)
 """Rows of finger bones."""
@@ -115,15 +117,17 @@ class AvatarHand:
         skin = _rotated(to_frame, rig.skin)
         points = [self._points[bone] for bone in bones]
         sure, guess = (rotate(to_frame, ends[finger]) for ends in (rig.tips, rig.ends))
-        points.append(_tip(points, skin[rig.owners == bones[-1]], sure, guess))
-        along = _unit(points[1] - points[0])
-        frame = _bone_frame(along, self._model(JOINTS[bones[0]]))
+        model = self._model(JOINTS[bones[0]])
+        points.append(_tip(points, skin[rig.owners == bones[-1]], model, sure, guess))
+        along = direction = _unit(points[1] - points[0])
+        frame = bent = _bone_frame(along, model)
         at, palm = points[0], self._points[_MIDDLE_KNUCKLE]
         for bone, start, end in zip(bones, points, points[1:], strict=False):
             joint = JOINTS[bone]
             self.joints[joint] = [*at, *frame]
             guess = REST_RADII[joint] * np.linalg.norm(palm if not np.isnan(palm[0]) else start) / _MODEL_PALM_M
-            self.radii[joint] = _radius(skin[rig.owners == bone], start, end, guess)
+            bent, direction = multiply(from_to(direction, end - start), bent), end - start
+            self.radii[joint] = _radius(skin[rig.owners == bone], start, end, _palmar(bent), guess)
             straight = multiply(from_to(end - start, along), multiply(to_frame, rig.rotations[bone]))
             self._bind[bone] = multiply(conjugate(frame), straight)
             at = at + np.linalg.norm(end - start) * along
@@ -196,30 +200,46 @@ def _palm_frame(side: str, positions: np.ndarray) -> np.ndarray:
     return _quaternion(turn)
 
 
-def _tip(points: list[np.ndarray], skin: np.ndarray, sure: np.ndarray, guess: np.ndarray) -> np.ndarray:
+def _tip(
+    points: list[np.ndarray], skin: np.ndarray, model: np.ndarray, sure: np.ndarray, guess: np.ndarray
+) -> np.ndarray:
     """Where a finger ends: at its known tip, where its skin does, at the guess, or by the length of its bone before."""
     if not np.isnan(sure[0]):
         return sure
     before = points[-1] - points[-2] if len(points) > 1 else np.array([0.0, 0.0, -0.03])
     along = _unit(before)
     if len(skin) > 8:
-        beyond = skin - points[-1]
-        radius = np.median(np.linalg.norm(np.cross(beyond, along), axis=1))
-        return points[-1] + max((beyond @ along).max() - radius, 0.3 * np.linalg.norm(before)) * along
+        at = (skin - points[-1]) @ along
+        away = skin - points[-1] - at[:, None] * along
+        facing = _facing(away, _palmar(_bone_frame(along, model)))
+        radius = np.median(np.linalg.norm(away[facing] if facing.any() else away, axis=1))
+        return points[-1] + max(at.max() - radius, 0.3 * np.linalg.norm(before)) * along
     return guess if not np.isnan(guess[0]) else points[-1] + _TIP_SHARE * before
 
 
-def _radius(skin: np.ndarray, start: np.ndarray, end: np.ndarray, guess: float) -> float:
-    """The distance of the skin from a bone; NaN where there is little skin, or it is not that of a finger."""
+def _radius(skin: np.ndarray, start: np.ndarray, end: np.ndarray, palmar: np.ndarray, guess: float) -> float:
+    """The distance of the skin from a bone on the palmar side, which touches things.
+
+    NaN where there is little skin, or it is not that of a finger.
+    """
     along = end - start
-    length = max(float(np.linalg.norm(along)), 1e-9)
     own = skin - start
-    at = own @ along / length**2
-    middle = own[(at > 0.1) & (at < 0.9)]
-    if len(middle) < 6:
+    at = own @ along / max(float(along @ along), 1e-18)
+    middle = (own - at[:, None] * along)[(at > 0.1) & (at < 0.9)]
+    facing = _facing(middle, palmar)
+    if len(middle) < 6 or not facing.any():
         return np.nan
-    radius = float(np.median(np.linalg.norm(np.cross(middle, along / length), axis=1)))
+    radius = float(np.median(np.linalg.norm(middle[facing], axis=1)))
     return radius if _RADIUS_SHARES[0] * guess < radius < _RADIUS_SHARES[1] * guess else np.nan
+
+
+def _palmar(frame: np.ndarray) -> np.ndarray:
+    return rotate(frame, np.array([0.0, -1.0, 0.0]))
+
+
+def _facing(away: np.ndarray, palmar: np.ndarray) -> np.ndarray:
+    """Which of the vectors `(N, 3)` from a bone to its skin point to the palm."""
+    return away @ palmar > _PALMAR * np.linalg.norm(away, axis=1)
 
 
 def _bone_frame(along: np.ndarray, model: np.ndarray) -> np.ndarray:

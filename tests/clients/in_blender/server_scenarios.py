@@ -138,5 +138,42 @@ def a_stretched_armature_is_refused_with_the_remedy():
         session.start(scenarios.ADDRESS, 0.05, [Cast("", rig, True, None, True)], CONTROL)
 
 
+# -- remote control --------------------------------------------------------------------------------------------------
+
+
+def the_panel_controls_the_server():
+    session.start(scenarios.ADDRESS, 0.05, [Cast()], CONTROL)
+    remote, chosen = session.remote, bpy.context.scene.manipnet
+    until(lambda: remote.state.objects)
+    assert not remote.problem
+    (actor,) = remote.state.bodies
+    assert bpy.ops.manipnet.select_object(actor=actor, body="Box", object="mug") == {"FINISHED"}
+    until(lambda: remote.state.bodies[actor]["Box"]["object"] == "mug")
+    assert "mug" in remote.message, remote.message
+    chosen.look_ahead = 0.25
+    until(lambda: remote.message == "Look-ahead is 0.25 s")
+    assert bpy.ops.manipnet.rest() == {"FINISHED"}
+    until(lambda: "rest" in remote.message)
+    chosen.take_name = "from the panel"
+    assert bpy.ops.manipnet.record_on_server() == {"FINISHED"}
+    until(lambda: remote.state.recording is not None or "refuses" in remote.message)
+    if remote.state.recording is not None:  # a server without --takes refuses, and says so
+        assert bpy.ops.manipnet.record_on_server() == {"FINISHED"}
+        until(lambda: remote.message.startswith("Recorded"))
+    assert bpy.ops.manipnet.select_object(actor=actor, body="Box", object="cube") == {"FINISHED"}
+    until(lambda: remote.state.bodies[actor]["Box"]["object"] == "cube")
+
+
+def requests_without_a_session_are_refused():
+    with scenarios.refused(RuntimeError, "poll() failed"):
+        bpy.ops.manipnet.rest()
+
+
+def a_server_that_does_not_answer_is_named():
+    session.start(scenarios.ADDRESS, 0.05, [Cast()], "tcp://127.0.0.1:1")
+    until(lambda: session.remote.problem)
+    assert "127.0.0.1:1" in session.remote.problem, session.remote.problem
+
+
 if __name__ == "__main__":
     scenarios.main(globals())

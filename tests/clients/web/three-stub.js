@@ -13,14 +13,20 @@ export const [Scene, HemisphereLight, GridHelper, PerspectiveCamera, MeshStandar
 export const [SphereGeometry, BufferGeometry, BufferAttribute, LineSegments, LineBasicMaterial] = Array(5).fill(Anything);
 export const [Group, Matrix4, AxesHelper, Vector3, OrbitControls] = Array(5).fill(Anything);
 
-export const [CylinderGeometry, Quaternion, Box3, OBJLoader] = Array(4).fill(Anything);
+export const [CylinderGeometry, Quaternion, Box3, OBJLoader, GLTFLoader] = Array(5).fill(Anything);
+export const VRButton = { createButton: () => document.createElement("button") };
 
 export class WebGLRenderer {
   domElement = document.createElement("canvas");
   frames = 0;
+  xr = {};
   setPixelRatio() {}
   setSize() {}
   setClearColor() {}
+  setAnimationLoop(draw) {
+    requestAnimationFrame(() => this.setAnimationLoop(draw));
+    draw();
+  }
   render() {
     document.body.dataset.frames = ++this.frames;
   }

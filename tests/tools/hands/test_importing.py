@@ -137,7 +137,9 @@ def test_the_unit_of_a_bvh_file_is_guessed_and_said(tmp_path, scale, unit):
 
 
 def test_the_bone_map_of_the_clients_adds_to_the_names(tmp_path):
-    nodes = [(name.replace("Index", "Zeige").replace("RightHand", "R.Tatze"), *rest) for name, *rest in rig()]
+    nodes = [
+        (name.replace("Index", "Zeige").replace("RightHand", "R.Tatze"), parent, place) for name, parent, place in rig()
+    ]
     table = {f"Left{part}": f"LeftHandZeige{n}" for n, part in ((1, "HandIndex1"), (2, "IndexIntermediate"))}
     table |= {"index_03_l": "LeftHandZeige3", "RightHand": "R.Tatze"}
     for word, name in zip(WORDS, ("Thumb", "Zeige", "Middle", "Ring", "Pinky"), strict=True):

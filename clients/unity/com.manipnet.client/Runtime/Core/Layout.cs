@@ -173,7 +173,7 @@ namespace ManipNet.Client
             0.79692597f, -0.10265449f, -0.00457582f, 0.59527315f,
             0.80353472f, -0.02063239f, -0.0047409f, 0.59488132f,
         };
-        /// <summary>OpenXR joints of a right hand with straight fingers, in the frame of its wrist joint.</summary>
+        /// <summary>OpenXR joints of a straight right hand, in the frame of its wrist joint.</summary>
         public static readonly float[] RestJoints =
         {
             -0.00125853f, 0.0025207f, -0.06974442f, 0.0f, 0.0f, 0.0f, 1.0f,
