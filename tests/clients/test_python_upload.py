@@ -43,10 +43,7 @@ def test_a_restarted_server_has_the_profile_again(tiny_bundle) -> None:
     try:
         until(lambda: "cannot be uploaded" in upload.problem)
         taken = upload.uploads
-        ports = [
-            f"--{option}={address.rpartition(':')[2]}"
-            for option, address in (("port", hands), ("control-port", control))
-        ]
+        port, control_port = (address.rpartition(":")[2] for address in (hands, control))
         with serving("--model", str(tiny_bundle), "--port", port, "--control-port", control_port):
             until(lambda: upload.uploads > taken and not upload.problem)
     finally:
