@@ -258,6 +258,27 @@ def csharp_rig_names() -> str:
     return "\n".join([*lines, "    }", "}"]) + "\n"
 
 
+def gdscript_layout() -> str:
+    lines = [f"# {NOTE}", ""]
+    lines += [f"const {name.upper()} = {value}" for name, value in constants().items()]
+    for name, words in NAMES.items():
+        lines += [f"const {name.upper()} = ["] + [f'\t"{word}",' for word in words] + ["]"]
+    lines += ["# OpenXR joints of a straight right hand in the frame of its wrist joint: metres, xyz and xyzw."]
+    lines += ["const REST_JOINTS = ["] + [f"\t{json.dumps(row)}," for row in REST_JOINTS.tolist()] + ["]"]
+    return "\n".join(lines) + "\n"
+
+
+def gdscript_rig_names() -> str:
+    lines = [f"# {NOTE}", ""]
+    for name, table in _rig_tables().items():
+        lines += [f"const {name.upper()} = {{"]
+        for side, texts in table.items():
+            words = [f"\t\t{json.dumps(text, ensure_ascii=False)}," for text in texts]
+            lines += [f'\t"{side}": [', *words, "\t],"]
+        lines += ["}"]
+    return "\n".join(lines) + "\n"
+
+
 def _rig_tables() -> dict[str, dict[Side, list[str]]]:
     return {
         "finger_bones": {side: bone_names(side) for side in SIDES},
@@ -291,6 +312,8 @@ def files() -> dict[Path, str]:
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/Layout.h": cpp_layout(),
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RestJoints.h": cpp_rest_joints(),
         FOLDER / "unreal/ManipNetLiveLink/Source/ManipNetLiveLink/Private/Core/RigNames.h": cpp_rig_names(),
+        FOLDER / "godot/addons/manipnet/layout.gd": gdscript_layout(),
+        FOLDER / "godot/addons/manipnet/rig_names.gd": gdscript_rig_names(),
         FOLDER / "web/layout.js": javascript_layout(),
         FOLDER / "web/rig-names.js": javascript_rig_names(),
         **manifests(),

@@ -37,7 +37,8 @@ BODY_REASONS = (
 
 CONTROL_OPS = (
     *("hello", "ping", "status", "objects", "mesh", "select_object", "add_object", "place_object", "calibrate"),
-    *("hand_profile", "look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "invalid"),
+    *("hand_profile", "look_ahead", "rest", "pause", "record", "stop_recording", "recordings", "edit_recording"),
+    *("delete_recording", "save_rig", "invalid"),
 )
 
 LABELS: dict[str, tuple[str, tuple[str, ...]]] = {

@@ -10,13 +10,14 @@ import time
 
 import numpy as np
 import pytest
-from avatar_rigs import KINDS, avatar_rig, rest_of
+from avatar_rigs import KINDS, Rig, avatar_rig, rest_of
 from checkout import VECTORS
 from languages import LiveClient, run
 from live_server import Stage, scene, serving
 from make_hand_profiles import vectors
+from manipnet_client.avatar import AvatarHand, RigHand
 
-from manipnet.geometry import SIDES, Side, quat_rotate
+from manipnet.geometry import SIDES, Side, quat_conjugate, quat_multiply, quat_rotate
 from manipnet.outputs.axes import to_unity, to_unreal
 from manipnet.wire.rig_names import FINGER_PATTERNS, METACARPAL_PATTERNS, find_bones, finger_names, metacarpal_names
 
@@ -32,6 +33,11 @@ def language(request):
     return request.param
 
 
+@pytest.fixture(scope="module")
+def unreal(harness):
+    return harness("unreal-avatar")
+
+
 def rests(language, kind, seed=0):
     to_engine, _ = ENGINES[language]
     return {side: rest_of(avatar_rig(kind, seed), kind, side, to_engine) for side in SIDES}
@@ -45,11 +51,31 @@ def test_the_vectors_are_those_of_the_import():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_profiles_agree_with_those_of_the_import(harness, language, kind):
-    expected = json.loads((VECTORS / "hand_profiles.json").read_text(encoding="utf-8"))[kind]["profile"]
     hands = rests(language, kind)
     lines = run(harness(language), "profile", text="".join(hand.line() + "\n" for hand in hands.values()))
-    for side, line in zip(hands, lines, strict=True):
-        found = json.loads(line)[side]["joints"]
+    agree(kind, {side: json.loads(line)[side]["joints"] for side, line in zip(hands, lines, strict=True)})
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_profiles_of_the_python_client_agree_with_those_of_the_import(kind):
+    profiles = {}
+    for side in SIDES:
+        rest = rest_of(avatar_rig(kind), kind, side, lambda pose: pose)
+        rows = [
+            np.array([part.get(k, np.full(width, np.nan)) for k in range(first, count)])
+            for part, width, first, count in (
+                *((rest.positions, 3, 0, 15), (rest.rotations, 4, 0, 15)),
+                *((rest.tips, 3, 0, 5), (rest.metacarpals, 3, 1, 5)),
+            )
+        ]
+        rig = RigHand(rows[0], rows[1], rows[2], metacarpals=rows[3])
+        profiles[side] = AvatarHand(side, rig).content()["joints"]
+    agree(kind, profiles)
+
+
+def agree(kind, profiles):
+    expected = json.loads((VECTORS / "hand_profiles.json").read_text(encoding="utf-8"))[kind]["profile"]
+    for side, found in profiles.items():
         assert [row is None for row in found] == [row is None for row in expected[side]["joints"]]
         ours, theirs = (np.array([row for row in rows if row], float) for rows in (found, expected[side]["joints"]))
         np.testing.assert_allclose(ours[:, :3], theirs[:, :3], atol=AGREEMENT_M)
@@ -222,6 +248,104 @@ def test_unity_components_put_the_fingertips_where_the_message_says(harness, sta
             for finger in rest.tips:
                 name = max(n for n, above in enumerate(rig.parents) if above == rest.bones[last_bone(rest, finger)])
                 assert np.linalg.norm(places[name] - joints[5 + 5 * finger, :3]) < TIP_M, rig.names[name]
+    finally:
+        client.kill()
+
+
+@pytest.mark.parametrize(("kind", "scale"), [("manny", 1.0), ("metahuman", 1.0), ("mixamo", 0.01)])
+def test_unreal_asset_puts_the_fingertips_where_the_message_says(unreal, stage, performance, kind, scale):
+    """The retarget asset only turns bones, so that all places are relative to the hand bone."""
+    rig = avatar_rig(kind, seed=3)
+    client = unreal_character(unreal, stage.server, rig, scale)
+    hands = {side: rest_of(rig, kind, side, to_unreal) for side in SIDES}
+    subjects = {side: f"ManipNet_actor_Bob_{side}" for side in SIDES}
+    try:
+        for _ in range(5):
+            shown = shown_when(client, lambda s: all(is_subject(s, subjects[k], hands[k]) for k in SIDES))
+            places = np.array(shown["bones"]).reshape(-1, 3)
+            for side, rest in hands.items():
+                joints = subject_joints(shown[subjects[side]])
+                wrist = places[rig.parents[rest.bones[0]]]
+                for bone, k in rest.bones.items():
+                    joint = 2 + bone if bone < 3 else 2 + 5 * (bone // 3) + bone % 3
+                    assert np.linalg.norm(places[k] - wrist - joints[joint] + joints[1]) < 100 * TIP_M, rig.names[k]
+                for finger in rest.tips:
+                    tip = rig.parents.index(rest.bones[last_bone(rest, finger)])
+                    off = places[tip] - wrist - joints[5 + 5 * finger] + joints[1]
+                    assert np.linalg.norm(off) < 100 * TIP_M, rig.names[tip]
+        assert "Hz" in shown["status"]
+    finally:
+        client.kill()
+
+
+def unreal_character(command, server, rig, scale, mesh="/Game/Bob.Bob"):
+    """The plugin with a source for a skeletal mesh, whose root has a scale."""
+    poses = [to_unreal(np.hstack(pose)) for pose in zip(rig.positions, rig.rotations, strict=True)]
+    lines = [f"/Game/Bob.Bob {len(poses)}"]
+    for name, parent, pose in zip(rig.names, rig.parents, poses, strict=True):
+        above = poses[parent] if parent >= 0 else np.array([0.0, 0, 0, 0, 0, 0, 1])
+        back = quat_conjugate(above[3:])
+        local = quat_rotate(back, pose[:3] - above[:3]) / (1.0 if parent < 0 else scale)
+        numbers = [*local, *quat_multiply(back, pose[3:]), scale if parent < 0 else 1.0]
+        lines.append(" ".join([name, str(parent), *(repr(float(x)) for x in numbers)]))
+    hands, control = (server.addresses[what] for what in ("hands", "control"))
+    text = f"{hands} delay=0.05 control={control.rpartition(':')[2]} avatar={mesh}"
+    client = LiveClient.run([*command, text])
+    assert client.process.stdin is not None
+    client.process.stdin.write("\n".join(lines) + "\n")
+    return client
+
+
+def subject_joints(values):
+    """The places of OpenXR's joints; in a subject the wrist comes before the palm."""
+    places = np.array(values).reshape(26, 3)
+    return places[[1, 0, *range(2, 26)]]
+
+
+def is_subject(shown, subject, rest):
+    if subject not in shown:
+        return False
+    joints = np.hstack([subject_joints(shown[subject]), np.zeros((26, 4))])
+    return is_a_hand(0.01 * joints, rest, 0.01)
+
+
+def test_unreal_source_says_why_it_cannot_solve_on_an_avatar(unreal, stage):
+    client = unreal_character(unreal, stage.server, avatar_rig("manny"), 1.0, "/Game/Other.Other")
+    try:
+        assert client.ask()["status"] == (
+            "the avatar /Game/Other.Other cannot be loaded; choose a skeletal mesh of this project"
+        )
+    finally:
+        client.kill()
+    rig = Rig(["root"], [-1], [np.zeros(3)], [np.array([0.0, 0.0, 0.0, 1.0])])
+    client = unreal_character(unreal, stage.server, rig, 1.0)
+    try:
+        assert client.ask()["status"].startswith("the avatar has no hands: left hand: no bone for hand, thumb")
+    finally:
+        client.kill()
+
+
+def test_unreal_nodes_control_the_server(unreal, stage):
+    client = unreal_character(unreal, stage.server, avatar_rig("manny"), 1.0)
+    address = stage.server.addresses["control"]
+    assert client.process.stdin is not None
+    assert client.process.stdout is not None
+
+    def ask(words, to=address):
+        client.process.stdin.write(f"request {to} {words}\n")
+        client.process.stdin.flush()
+        return client.process.stdout.readline().rstrip("\n")
+
+    try:
+        pin, reply = ask("pause").split(" ", 1)
+        assert (pin, json.loads(reply)["paused"]) == ("replied", True)
+        assert ask('{"op": "pause", "on": false}').startswith("replied {")
+        assert ask("record").startswith("refused ")
+        assert ask("record").count("--takes") == 1, "the server of this test keeps no takes, and says so"
+        assert 'mug \\"x\\"' in ask("select") or "mug" in ask("select")
+        assert ask("{").startswith("refused ")
+        assert ask("stop", "tcp://127.0.0.1:1") == "refused no server answers at 127.0.0.1:1"
+        assert ask("stop", "udp://x").startswith("refused the address is")
     finally:
         client.kill()
 

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from checkout import CLIENTS, ROOT, VECTORS, need, publishing
 from languages import run
 from random_hand import posed
 from test_retarget import foreign_rig, shown_directions
+from unity_cutter import Reference, compile_signatures, cut, stubbed_types
 from unity_facts import FACTS, VERSIONS
 
 from manipnet.geometry import quat_multiply, quat_rotate
@@ -63,15 +65,32 @@ def printed(glue):
     return {"address": tcp, "all": done.stdout} | dict(line.split(" ", 1) for line in done.stdout.splitlines())
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_the_engine_has_what_the_package_uses(version):
-    """Looks the facts up in a clone of Unity's reference source."""
+@pytest.fixture(scope="module")
+def reference():
+    """The folder of a clone of Unity's reference source."""
     clone = os.environ.get("MANIPNET_UNITY_REFERENCE")
     if not clone:
         pytest.skip("needs MANIPNET_UNITY_REFERENCE, a clone of github.com/Unity-Technologies/UnityCsReference")
+    return clone
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_engine_has_what_the_package_uses(reference, version):
     for folders, signature in FACTS:
-        command = ["git", "-C", clone, "grep", "-qE", _pattern(signature), version, "--", *folders.split("|")]
+        command = ["git", "-C", reference, "grep", "-qE", _pattern(signature), version, "--", *folders.split("|")]
         assert subprocess.run(command, check=False).returncode == 0, f"{version} lacks {signature}"
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_package_compiles_with_the_signatures_of_the_engine(reference, version, tmp_path):
+    (mcs,) = need("mcs")
+    sources = [path for path in PACKAGE.rglob("*.cs") if not {"XRHands", "Tests"} & set(path.parts)]
+    used = set(re.findall(r"\w+", " ".join(path.read_text(encoding="utf-8") for path in sources)))
+    names = stubbed_types([CSHARP / "stubs" / "UnityEngine.cs", CSHARP / "stubs" / "UnityEditor.cs"])
+    library = compile_signatures(cut(Reference(reference, version), names, used), tmp_path, mcs)
+    options = ["-langversion:7.2", "-warn:4", "-warnaserror", "-nowarn:649", "-r:System.Core", f"-r:{library}"]
+    output = ["-target:library", f"-out:{tmp_path / 'package.dll'}"]
+    subprocess.run([mcs, *options, *output, *map(str, sources)], check=True)
 
 
 def _pattern(signature):
@@ -177,6 +196,21 @@ def test_another_actor_in_the_inspector_takes_effect_while_playing(printed):
 
 def test_setting_a_character_up_twice_adds_one_pair_and_can_be_undone(printed):
     assert printed["twice"] == "2 1 True True True"
+
+
+def test_one_receiver_shows_several_actors(glue):
+    command = [sys.executable, str(ROOT / "tests" / "support" / "actors_publisher.py")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as publisher:
+        try:
+            assert publisher.stdout is not None
+            address = publisher.stdout.readline().split()[1]
+            lines = run(glue, address, "actors", "Anna", "Ben")
+        finally:
+            publisher.kill()
+    assert [lines[0], lines[3]] == ["Anna True True", "Ben False True"]
+    for wrist, place in (lines[1:3], lines[4:6]):
+        assert np.linalg.norm(np.array(place.split()[1:], float)) > 0.1
+        np.testing.assert_allclose(np.array(wrist.split()[1:4], float), np.array(place.split()[1:], float), atol=1e-6)
 
 
 def test_package_names_the_modules_that_it_uses():

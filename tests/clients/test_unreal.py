@@ -2,15 +2,18 @@
 
 import importlib.util
 import json
+import os
 import re
 import subprocess
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from checkout import CLIENTS, ROOT, VECTORS, need, publishing
 from languages import CPP, run
 from make_vectors import messages
+from unreal_facts import FACTS, RUNTIME
 from unreal_headers import MODULE, write_headers
 
 from manipnet.outputs.livelink.sender import hand_json
@@ -51,6 +54,21 @@ def test_zip_names_its_engine(engine, tmp_path):
 
 def test_stubs_agree_with_the_facts_that_were_read_in_the_engine(compiler):
     subprocess.run([*compiler, "-fsyntax-only", str(GLUE / "facts.cpp")], check=True)
+
+
+def test_the_engine_has_what_the_plugin_uses():
+    source = os.environ.get("MANIPNET_UNREAL_SOURCE")
+    if not source:
+        pytest.skip("needs MANIPNET_UNREAL_SOURCE, the folder of an engine's source")
+    for header, _, signature in FACTS:
+        text = (Path(source) / RUNTIME / header).read_text(encoding="utf-8", errors="replace")
+        assert _plain(signature) in _plain(text), f"{header} lacks {signature}"
+
+
+def _plain(code):
+    """Code without export macros and without the space that does not part words."""
+    words = re.findall(r"\w+|[^\w\s]", re.sub(r"\b\w+_API\b", "", code))
+    return " ".join(words)
 
 
 def test_module_names_the_modules_whose_headers_it_includes():
@@ -135,11 +153,14 @@ def test_connection_strings(core):
         "tcp://10.0.0.7:6000": "10.0.0.7 6000 '' 0.1 | tcp://10.0.0.7:6000",
         "tcp://[::1]:6000  actor=Anna delay=0.05": "::1 6000 'Anna' 0.05 | tcp://[::1]:6000 actor=Anna delay=0.05",
         'tcp://x:5 actor="Anna B" mode=raw': "x 5 'Anna B' 0.1 | tcp://x:5 actor=\"Anna B\" mode=raw",
+        'tcp://x:5 control=6 avatar=/Game/A.A "bones={%22LeftHand%22: %22a%25b%22}"': (
+            "x 5 '' 0.1 | tcp://x:5 control=6 avatar=/Game/A.A bones=\"{%22LeftHand%22: %22a%25b%22}\""
+        ),
         "tcp://x:5 yaw=180 origin=1,-2.5,3 scale=2": "x 5 '' 0.1 | tcp://x:5 yaw=180 origin=1,-2.5,3 scale=2",
     }
     wrong = ["10.0.0.7:6000", "tcp://x", "tcp://x:0", "tcp://x:70000", "tcp://x:5 delay=2", "tcp://x:5 delay="]
     wrong += ["tcp://x:5 y=1", "tcp://x:5 mode=fast", "tcp://x:5 yaw=nan", "tcp://x:5 origin=1,2", "tcp://x:5 scale=0"]
-    wrong += ["tcp://x:5 origin=1,2,3,4", "tcp://x:5 yaw=1e9"]
+    wrong += ["tcp://x:5 origin=1,2,3,4", "tcp://x:5 yaw=1e9", "tcp://x:5 control=0", "tcp://x:5 control=x"]
     lines = run(core, "connections", text="".join(f"{text}\n" for text in [*meanings, *wrong]))
     assert lines[: len(meanings)] == list(meanings.values())
     assert all(line.startswith("error: ") and "allowed" in line for line in lines[len(meanings) :])

@@ -128,7 +128,8 @@ def retarget(tmp_path_factory):
     (compiler,) = need("g++")
     folder = tmp_path_factory.mktemp("character")
     exe = folder / "character"
-    sources = [MODULE / "Private" / "ManipNetRetargetAsset.cpp", *CPP.glob("*.cpp")]
+    own = ("ManipNetRetargetAsset.cpp", "ManipNetSkeletons.cpp")
+    sources = [*(MODULE / "Private" / name for name in own), *CPP.glob("*.cpp")]
     options = ["-pthread", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-o", str(exe)]
     sources = [*sources, ROOT / "tests" / "clients" / "cpp" / "character.cpp"]
     subprocess.run([compiler, *write_headers(folder), *options, *map(str, sources)], check=True)

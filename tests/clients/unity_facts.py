@@ -5,7 +5,7 @@ the test looks again if `MANIPNET_UNITY_REFERENCE` names a clone of it. Spaces c
 in com.unity.xr.hands, whose source is in its package.
 """
 
-VERSIONS = ("2021.3.58f1", "2022.3.76f1", "6000.0.78f1")
+VERSIONS = ("2021.3.58f1", "2022.3.76f1", "6000.0.78f1", "6000.3.19f1", "6000.5.2f1")
 
 FACTS = (
     ("Modules/Animation", "public enum HumanBodyBones"),
@@ -58,6 +58,10 @@ FACTS = (
         "public static void SetEditorCurve(AnimationClip clip, EditorCurveBinding binding",
     ),
     ("Editor/Mono", "public static void SetAnimationEvents"),
+    ("Editor/Mono", "public bool DrawDefaultInspector()"),
+    ("Editor/Mono", "public virtual bool RequiresConstantRepaint()"),
+    ("Editor/Mono", "public CustomEditor(System.Type inspectedType)"),
+    ("Runtime/Transform|Runtime/Export", "public extern Vector3 lossyScale"),
     ("Editor/Mono", "public static void SetParentAndAlign(GameObject child, GameObject parent)"),
     ("Modules/AssetDatabase|Editor/Mono", "extern public static string GenerateUniqueAssetPath(string path);"),
     ("Modules/AssetDatabase|Editor/Mono", "CreateAsset([NotNull] Object asset, string path)"),

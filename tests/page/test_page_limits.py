@@ -21,6 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from manipnet.page.frames import Frame, PropView, ShapeView
+from manipnet.page.hand_look import look_of
 from manipnet.page.serialization import unpack
 from manipnet.page.show import Show
 from manipnet.page.supervisor import LivePage
@@ -111,7 +112,7 @@ def test_the_page_forgets_the_shapes_that_nobody_carries() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         server = open_server(listener, "test", lambda *_: "")
         try:
-            show = Show(server, shipped_hand(), lambda _: None)
+            show = Show(server, look_of(shipped_hand()), lambda _: None)
             for k in range(100):
                 show.add_shape(ShapeView("cube", f"{k}", np.zeros((3, 3)), np.array([[0, 1, 2]])))
                 show.add_frame(frame("ann", f"{k}"))

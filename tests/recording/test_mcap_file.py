@@ -4,6 +4,7 @@ import json
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from manipnet.recording.mcap_file import (
     read_about,
     read_bodies,
     read_hands,
+    recorded_avatars,
     recover,
 )
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
@@ -161,3 +163,40 @@ def test_a_killed_writer_loses_less_than_a_second(tmp_path: Path) -> None:
     assert [f.frame for f in frames] == list(range(len(frames)))
     assert written[0] - len(frames) < 120
     assert recover(path, tmp_path / "mended.mcap").meshes == MESHES
+
+
+def write_with_avatar(path: Path) -> Path:
+    with RecordingWriter(path, ABOUT, MESHES) as writer:
+        for k in range(120):
+            writer.write_hands(hands(k), START_NS + k * 16_666_667)
+            if k == 60:
+                writer.add_about({"hand long": "{}"})
+            if k >= 60:
+                writer.write_hands(replace(hands(k), hand="long"), START_NS + k * 16_666_667)
+    return path
+
+
+def test_the_hands_of_an_avatar_have_a_topic_of_their_own(tmp_path: Path) -> None:
+    path = write_with_avatar(tmp_path / "take.mcap")
+    about = read_about(path)
+    assert about.metadata == ABOUT | {"hand long": "{}"}
+    assert recorded_avatars(about) == ["long"]
+    assert [message.seq for message in read_hands(path)] == list(range(120))
+    avatar = list(read_hands(path, "long"))
+    assert [(message.seq, message.hand, message.bodies) for message in avatar] == [
+        (k, "long", ()) for k in range(60, 120)
+    ]
+    with path.open("rb") as file:
+        frames = [json.loads(m.data)["transforms"] for _, _, m in make_reader(file).iter_messages([TF])]
+    assert {"actor/left/index_tip", "actor/long/left/index_tip"} <= {t["child_frame_id"] for f in frames for t in f}
+
+
+def test_a_cut_off_file_with_an_avatar_is_recovered(tmp_path: Path) -> None:
+    content = write_with_avatar(tmp_path / "take.mcap").read_bytes()
+    cut, mended = tmp_path / "cut.mcap", tmp_path / "mended.mcap"
+    cut.write_bytes(content[: int(0.8 * len(content))])
+    recover(cut, mended)
+    about = read_about(mended)
+    assert about.whole
+    assert about.metadata == ABOUT | {"hand long": "{}"}
+    assert len(list(read_hands(mended, "long"))) == len(list(read_hands(cut, "long"))) > 10

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from screen import Screen
 
 from manipnet.common.text_output import accept_any_text
 from manipnet.runtime.console import Console
@@ -99,30 +100,6 @@ def test_nothing_takes_the_place_of_a_closed_standard_stream(closed: str, tmp_pa
     streams = " ".join(f"{stream}>&-" for stream in closed)
     program = ["sh", "-c", f'exec "$0" "$@" {streams}', sys.executable, "-c", OPEN_A_FILE]
     assert subprocess.run(program, cwd=tmp_path, check=False).returncode > 2
-
-
-class Screen:
-    """A terminal of 80 columns that keeps what a person sees: the lines, of which the last may be rewritten."""
-
-    def __init__(self) -> None:
-        self.lines = [""]
-
-    def write(self, text: str) -> None:
-        for letter in text:
-            if letter == "\n":
-                self.lines.append("")
-                self._at = 0
-            elif letter == "\r":
-                self._at = 0
-            else:
-                line = self.lines[-1].ljust(self._at)
-                self.lines[-1] = line[: self._at] + letter + line[self._at + 1 :]
-                self._at += 1
-
-    _at = 0
-
-    def flush(self) -> None:
-        pass
 
 
 def test_a_terminal_has_one_status_line_below_the_lines():

@@ -16,14 +16,23 @@ from websockets.sync.client import connect
 from websockets.typing import Origin
 
 from manipnet.actors.avatar import Avatar
+from manipnet.page.playback import read_recording
+from manipnet.recording.mcap_file import read_about, read_hands, recorded_avatars
 from manipnet.runtime.avatars import FORGET_AFTER_S, MAX_PROFILES, Avatars, TooManyProfilesError
-from manipnet.synthesis.hand.profile import profile_to_json
+from manipnet.synthesis.hand.profile import parse_profile, profile_to_json
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
 from manipnet.wire import decode_binary, decode_msgpack
+from manipnet_tools.export.animation import read_animation
+from manipnet_tools.takes.take import read_take
 
 MODEL = shipped_hand()
 LONG, SMALL = scaled_profile(MODEL, 1.15, name="long"), scaled_profile(MODEL, whole=0.85, name="small")
+
+
+@pytest.fixture(scope="module")
+def takes(tmp_path_factory):
+    return tmp_path_factory.mktemp("takes")
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +48,11 @@ def receivers():
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory, receivers):
+def server(tmp_path_factory, receivers, takes):
     file = tmp_path_factory.mktemp("hand") / "small.json"
     file.write_text(profile_to_json(SMALL), encoding="utf-8")
     to = [f"{option}=127.0.0.1:{receiver.getsockname()[1]}" for option, receiver in receivers.items()]
-    with serving("--demo", "--hand", str(file), *to) as server:
+    with serving("--demo", "--hand", str(file), "--takes", str(takes), *to) as server:
         yield server
 
 
@@ -125,6 +134,25 @@ def test_a_wrong_profile_is_refused_and_the_server_goes_on(server, request_, rea
     assert server.ask({"op": "ping"})["t"] > 0
 
 
+def test_a_recording_keeps_the_hands_of_avatars_and_their_profiles(server, takes):
+    server.ask({"op": "record", "name": "take"})
+    server.ask({"op": "hand_profile", **as_content(scaled_profile(MODEL, 1.05, name="late"))})
+    assert len(received(server, "hand/late/bin", seconds=1.5)["hand/late/bin"]) > 20
+    ended = server.ask({"op": "stop_recording"})
+    path = takes / "take.mcap"
+    about = read_about(path)
+    assert set(recorded_avatars(about)) == {"small", "late"}  # nobody has subscribed to small
+    small, model = list(read_hands(path, "small")), list(read_hands(path))
+    assert abs(len(small) - len(model)) <= 1
+    assert ended["avatars"] == len(small) + len(list(read_hands(path, "late")))
+    for name, expected in (("small", SMALL), ("late", scaled_profile(MODEL, 1.05, name="late"))):
+        profile = parse_profile(json.loads(about.metadata[f"hand {name}"]))
+        np.testing.assert_allclose(profile.hands["left"].joints, expected.hands["left"].joints, atol=1e-6)
+    assert len(read_animation(path, MODEL).time_s) == len(model)
+    assert read_recording(path).messages[0].hand is None
+    assert read_take(path).bodies
+
+
 class Audience:
     def __init__(self):
         self.wanted: set[str] = set()
@@ -145,14 +173,14 @@ def test_a_profile_is_forgotten_when_nobody_subscribes():
     audience.wanted = {"long"}
     now[0] = 10 * FORGET_AFTER_S
     avatars.forget_unwanted()
-    assert set(avatars.names()) == {"long", "small"}
+    assert set(avatars.names()) == {("long", "actor"), ("small", "actor")}
     audience.wanted.clear()
     now[0] += FORGET_AFTER_S - 1.0
     avatars.forget_unwanted()
-    assert "long" in avatars.names()
+    assert ("long", "actor") in avatars.names()
     now[0] += 2.0
     avatars.forget_unwanted()
-    assert set(avatars.names()) == {"small"}
+    assert set(avatars.names()) == {("small", "actor")}
 
 
 def test_there_is_room_for_sixteen_profiles():
@@ -160,8 +188,18 @@ def test_there_is_room_for_sixteen_profiles():
     for n in range(MAX_PROFILES):
         avatars.add(Avatar(scaled_profile(MODEL, name=f"hand{n}"), MODEL), "actor")
     avatars.add(Avatar(scaled_profile(MODEL, 1.1, name="hand3"), MODEL), "actor")
-    with pytest.raises(TooManyProfilesError, match="already has 16"):
+    with pytest.raises(TooManyProfilesError, match=r"already has 16 .* no more are allowed .*hand15"):
         avatars.add(Avatar(LONG, MODEL), "actor")
+
+
+def test_one_profile_may_be_that_of_several_actors():
+    avatars = Avatars(Telemetry())
+    first, second = Avatar(LONG, MODEL), Avatar(LONG, MODEL)
+    avatars.add(first, "one", stays=True)
+    avatars.add(second, "two", stays=True)
+    avatars.add(Avatar(scaled_profile(MODEL, 0.9, name="long"), MODEL), "two")
+    assert avatars.names() == [("long", "one"), ("long", "two")]
+    assert avatars.profiles()[0] is LONG
 
 
 def test_a_wrong_hand_file_stops_the_start(tmp_path):

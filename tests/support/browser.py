@@ -48,8 +48,9 @@ _BY_LABEL = f"""(text, number) => {{
 class Page:
     """One page of the browser."""
 
-    def __init__(self, connection: Connection) -> None:
-        self._connection, self._ids = connection, itertools.count(1)
+    def __init__(self, connection: Connection, debugger: str = "") -> None:
+        """`debugger` is the address of the page's DevTools."""
+        self._connection, self._ids, self.debugger = connection, itertools.count(1), debugger
 
     def call(self, method: str, **params: Any) -> dict:
         """One request of the DevTools protocol, and its answer."""
@@ -57,6 +58,7 @@ class Page:
         self._connection.send(json.dumps({"id": number, "method": method, "params": params}))
         while (answer := json.loads(self._connection.recv(timeout=240))).get("id") != number:
             pass
+        assert "result" in answer, f"{method}: {answer}"
         return answer["result"]
 
     def evaluate(self, expression: str) -> Any:
@@ -82,12 +84,36 @@ class Page:
         """Click the element with exactly this text, once it exists."""
         self.press(self.wait_for(f"({_CENTER})({_BY_TEXT})({json.dumps(text)}, 0)", limit_s))
 
-    def type(self, label: str, text: str, number: int = 0) -> None:
-        """Replace what is in one of the fields of a label, and press Enter."""
-        self.press(self.wait_for(f"({_CENTER})({_BY_LABEL})({json.dumps(label)}, {number})"), times=3)
+    def type(self, label: str, text: str, number: int = 0, field: str = "input", enter: bool = True) -> None:
+        """Replace what is in one of the fields of a label, and press Enter unless told otherwise."""
+        find = _BY_LABEL.replace('"input"', json.dumps(field))
+        self.press(self.wait_for(f"({_CENTER})({find})({json.dumps(label)}, {number})"), times=3)
         self.call("Input.insertText", text=text)
-        for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", windowsVirtualKeyCode=13)
+        if enter:
+            self.key("Enter")
+
+    def key(self, key: str) -> None:
+        """Press and release a key, named as in `KeyboardEvent.key`."""
+        letter = len(key) == 1
+        named = {
+            " ": ("Space", 32),
+            "Enter": ("Enter", 13),
+            "ArrowLeft": ("ArrowLeft", 37),
+            "ArrowRight": ("ArrowRight", 39),
+        }
+        code, number = named.get(key) or (f"Key{key.upper()}", ord(key.upper()))
+        about = {"key": key, "code": code, "windowsVirtualKeyCode": number}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **about, **({"text": key} if letter else {}))
+        self.call("Input.dispatchKeyEvent", type="keyUp", **about)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press the mouse at one place, move it in steps to another, and release it there."""
+        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=start[0], y=start[1])
+        self.call("Input.dispatchMouseEvent", type="mousePressed", x=start[0], y=start[1], button="left", clickCount=1)
+        for step in range(1, 6):
+            x, y = (a + (b - a) * step / 5 for a, b in zip(start, end, strict=True))
+            self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y, button="left", buttons=1)
+        self.call("Input.dispatchMouseEvent", type="mouseReleased", x=end[0], y=end[1], button="left", clickCount=1)
 
     def tick(self, label: str) -> None:
         """Click the checkbox of a label."""
@@ -142,11 +168,24 @@ def browsing(chromium: str, url: str, profile: Path) -> Iterator[Page]:
         [chromium, *options, url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment
     )
     try:
-        with connect(_page_address(profile), max_size=None) as connection:
-            yield Page(connection)
+        address = _page_address(profile)
+        with connect(address, max_size=None) as connection:
+            yield Page(connection, address)
     finally:
         process.terminate()
         process.wait()
+
+
+@contextmanager
+def another(page: Page) -> Iterator[Page]:
+    """A second page of the same browser, which shows what the first one shows."""
+    devtools = page.debugger.split("/devtools/")[0]
+    target = page.call("Target.createTarget", url=page.evaluate("location.href"))["targetId"]
+    try:
+        with connect(f"{devtools}/devtools/page/{target}", max_size=None) as connection:
+            yield Page(connection)
+    finally:
+        page.call("Target.closeTarget", targetId=target)
 
 
 def _page_address(profile: Path) -> str:

@@ -31,6 +31,7 @@ def build(name: str, folder: Path) -> list[str]:
     builders = {
         "csharp": _csharp,
         "unity": _unity,
+        "unreal-avatar": _unreal_avatar,
         "gcc-sanitized": lambda folder: _gcc(folder, *SANITIZERS),
         "gcc-threads": lambda folder: _gcc(folder, "-fsanitize=thread"),
         "clang": _clang,
@@ -58,6 +59,18 @@ def _unity(folder: Path) -> list[str]:
     options = ["-langversion:7.2", "-warn:4", "-warnaserror", "-nowarn:649,67,414", "-r:System.Core", f"-out:{exe}"]
     subprocess.run([mcs, *options, *map(str, sources)], check=True)
     return [mono, str(exe)]
+
+
+def _unreal_avatar(folder: Path) -> list[str]:
+    """The whole Unreal plugin on stubs of the engine."""
+    from unreal_headers import MODULE, write_headers  # it needs this module's paths
+
+    exe, headers = folder / "avatar", folder / "engine"
+    headers.mkdir()
+    sources = [*MODULE.glob("Private/*.cpp"), *CPP.glob("*.cpp"), HARNESSES / "cpp" / "avatar.cpp"]
+    options = [*write_headers(headers), "-pthread", *SANITIZERS, "-o", str(exe)]
+    subprocess.run([*need("g++"), *options, *map(str, sources)], check=True)
+    return [str(exe)]
 
 
 def _gcc(folder: Path, *sanitizers: str) -> list[str]:

@@ -38,7 +38,8 @@ class Parser(argparse.ArgumentParser):
         if message.startswith(_UNKNOWN):
             return self._unknown(message.removeprefix(_UNKNOWN))
         if found := _CHOICE.fullmatch(message):
-            return f"{found['value']} is not known here; allowed are {found['allowed'].replace(chr(39), '')}"
+            value, allowed = (found[each].replace("'", "") for each in ("value", "allowed"))
+            return f"{value} is not known here; allowed are {allowed}"
         if found := _OF_OPTION.fullmatch(message):
             problem = found["problem"].replace("expected one argument", "needs a value")
             problem = problem.replace("ignored explicit argument", "takes no value, but was given")

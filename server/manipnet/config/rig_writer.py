@@ -55,7 +55,7 @@ def store(path: Path, actor: ActorConfig, backup: bool = True) -> Path:
     try:
         before = path.read_bytes()
         text = before.decode("utf-8-sig")
-        after = _with_placements(text, actor)
+        after = with_placements(text, actor)
         _check(after, path, actor)
         return replace_file(path, after, backup)
     except (OSError, ValueError, TOMLKitError, KeyError) as error:
@@ -74,7 +74,8 @@ def replace_file(path: Path, text: str, backup: bool = True) -> Path:
     return kept
 
 
-def _with_placements(text: str, actor: ActorConfig) -> str:
+def with_placements(text: str, actor: ActorConfig) -> str:
+    """The text of a rig file with the placements and the hand size of an actor. Raises `ConfigError`."""
     document: Any = tomlkit.parse(text)
     table = document
     if "actors" in document:
@@ -86,7 +87,7 @@ def _with_placements(text: str, actor: ActorConfig) -> str:
             _place(table["bodies"], wrist, body)
     for thing in actor.objects:
         if thing.body.offset is not None:
-            entry = next((entry for entry in table["objects"] if _is(entry, thing)), None)
+            entry = next((entry for entry in table["objects"] if is_entry_of(entry, thing)), None)
             if entry is None:
                 raise ConfigError(f"it no longer has an object {thing.name!r}")
             entry.update(_offset(thing.body.offset))
@@ -102,7 +103,8 @@ def _place(bodies: Any, wrist: str, body: BodyConfig) -> None:
         bodies[wrist] = _body(body)
 
 
-def _is(entry: Mapping[str, Any], thing: ObjectConfig) -> bool:
+def is_entry_of(entry: Mapping[str, Any], thing: ObjectConfig) -> bool:
+    """Whether an entry of a rig file describes this object."""
     return entry.get("name", str(entry["body"])) == thing.name
 
 

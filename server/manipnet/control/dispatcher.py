@@ -17,8 +17,16 @@ import msgpack
 from manipnet.control.request import Handler, Request, RequestError, quoted
 from manipnet.telemetry import CONTROL_OPS, Telemetry
 
-LOCAL_OPS: Final = ("add_object",)
-"""Operations that open files of the server's machine."""
+LOCAL_OPS: Final = {
+    "add_object": (
+        "opens files of the server's machine, so only a client on that machine may ask; put the mesh into the server's "
+        "folder --objects and use select_object, or drop the mesh on the live page there"
+    ),
+    "edit_recording": "changes files of the server's machine, so only a client on that machine may ask",
+    "delete_recording": "deletes files of the server's machine, so only a client on that machine may ask",
+    "save_rig": "changes the rig file on the server's machine, so only a client on that machine may ask",
+}
+"""Operations that only a client on the server's machine may ask for, and why."""
 STORING_OPS: Final = ("calibrate", "place_object")
 """Operations that change the rig file on the server's machine unless the request has `"store": false`."""
 SLOW_OPS: Final = {
@@ -27,8 +35,11 @@ SLOW_OPS: Final = {
     "select_object": "selection",
     "record": "recording",
     "stop_recording": "recording",
+    "edit_recording": "recording",
+    "delete_recording": "recording",
     "calibrate": "rig",
     "place_object": "rig",
+    "save_rig": "rig",
 }
 """Operations that may take long, and the thread that does them; requests on one thread keep their order."""
 MAX_WAITING: Final = 16
@@ -65,10 +76,7 @@ class Dispatcher:
             request = _decode(parts)
             op = _operation(request, ops)
             if op in LOCAL_OPS and not here:
-                raise RequestError(
-                    f"{op} opens files of the server's machine, so only a client on that machine may ask; put the mesh "
-                    "into the server's folder --objects and use select_object, or drop the mesh on the live page there"
-                )
+                raise RequestError(f"{op} {LOCAL_OPS[op]}")
             if op in STORING_OPS and not here and request.get("store") is not False:
                 raise RequestError(
                     f"{op} stores its result in the rig file on the server's machine, so only a client on that machine "

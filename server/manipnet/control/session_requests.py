@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from manipnet import __version__
+from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
 from manipnet.common.file_names import is_encodable
 from manipnet.config.settings import SCALE_RANGE
@@ -54,6 +55,8 @@ class SessionRequests:
         self._proxy, self._actors = actors_proxy, actors_proxy.actors
         self._catalog, self._telemetry = catalog, telemetry
         self._started_s = time.monotonic()
+        self._initial = {actor.config.name: _carried(actor) for actor in self._actors}
+        """What each body carried when the server started, as `objects` describes it."""
 
     def handlers(self) -> Mapping[str, Handler]:
         """One function per operation."""
@@ -93,15 +96,10 @@ class SessionRequests:
         return {**about, "model": self._bundle.name, "solver": self._solver, **report}
 
     def _objects(self, _: Request) -> dict[str, Any]:
-        def carried() -> dict[str, Any]:
-            return {
-                actor.config.name: {prop.name: _prop(prop) | placement(actor.offset(prop.name)) for prop in actor.props}
-                for actor in self._actors
-            }
-
         return {
             "objects": list(self._catalog.names()),
-            "bodies": self._proxy.ask(carried),
+            "bodies": self._proxy.ask(lambda: {actor.config.name: _carried(actor) for actor in self._actors}),
+            "initial": self._initial,
             "problems": self._catalog.problems(),
         }
 
@@ -170,6 +168,11 @@ class SessionRequests:
 def placement(offset: Array) -> dict[str, list[float]]:
     """An offset `(7,)` with the keys of a rig file."""
     return {"position": offset[:3].tolist(), "rotation": offset[3:].tolist()}
+
+
+def _carried(actor: Actor) -> dict[str, dict[str, Any]]:
+    """By prop, what an actor's bodies carry, at which size and place."""
+    return {prop.name: _prop(prop) | placement(actor.offset(prop.name)) for prop in actor.props}
 
 
 def _prop(prop: Prop) -> dict[str, Any]:

@@ -46,24 +46,28 @@ class Emission:
 
 
 class EncodedHands:
-    """A hands message and its two encodings, each of which is made once, when the first output needs it."""
+    """A hands message and its two encodings, each of which is made once, when the first client needs it."""
 
     def __init__(self, message: "HandsMessage") -> None:
+        """Raises `MessageError` for a message that breaks the protocol's rules, before anybody gets it."""
+        from manipnet.wire import check
+
+        check(message)
         self.message = message
 
     @cached_property
     def binary(self) -> bytes:
-        """The payload of `pose/bin`. Raises `MessageError` for a message that breaks the protocol's rules."""
+        """The payload of `pose/bin`."""
         from manipnet.wire import encode_binary
 
-        return encode_binary(self.message)
+        return encode_binary(self.message, checked=True)
 
     @cached_property
     def msgpack(self) -> bytes:
-        """The payload of `pose/msgpack`. Raises `MessageError` as `binary` does."""
+        """The payload of `pose/msgpack`."""
         from manipnet.wire import encode_msgpack
 
-        return encode_msgpack(self.message, checked="binary" in self.__dict__)
+        return encode_msgpack(self.message, checked=True)
 
 
 class HandsOutput:

@@ -1,7 +1,8 @@
 """Publishes the hands through every output that is turned on. Belongs to the tick thread, and nothing here waits."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Mapping
+from typing import Protocol
 
 from manipnet.outputs.declaration import EncodedHands, HandsOutput, Output
 from manipnet.synthesis.hand.profile import HandProfile
@@ -11,6 +12,17 @@ from manipnet.wire import HandsMessage
 _log = logging.getLogger(__name__)
 
 
+class Tape(Protocol):
+    """Records what is published, while `is_recording`. Its methods return at once."""
+
+    @property
+    def is_recording(self) -> bool: ...
+
+    def note(self, payload: bytes) -> None: ...
+
+    def note_avatar(self, payload: bytes, profile: HandProfile) -> None: ...
+
+
 class Publisher:
     """Encodes each hands message once and gives it to all outputs."""
 
@@ -18,10 +30,15 @@ class Publisher:
         self,
         outputs: Mapping[Output, HandsOutput],
         telemetry: Telemetry,
-        record: Callable[[bytes], object] = lambda _: None,
+        tape: Tape | None = None,
+        taped: Collection[str] = (),
     ) -> None:
-        """`record` is called with each message in msgpack, and must return at once. `close` closes the outputs."""
-        self._outputs, self._telemetry, self._record = dict(outputs), telemetry, record
+        """`tape` records what is published, and the avatars `taped` even if nobody receives them.
+
+        `close` closes the outputs.
+        """
+        self._outputs, self._telemetry = dict(outputs), telemetry
+        self._tape, self._taped = tape, frozenset(taped)
         for declared in outputs:
             telemetry.declare("messages_out", *declared.labels)
 
@@ -38,8 +55,8 @@ class Publisher:
     def publish(self, message: HandsMessage) -> None:
         """Send one message to everybody. Raises `MessageError` for a message that breaks the protocol's rules."""
         hands = EncodedHands(message)
-        _ = hands.binary  # checks the message before anybody gets it
-        self._record(hands.msgpack)
+        if self._tape is not None and self._tape.is_recording:
+            self._tape.note(hands.msgpack)
         for declared, output in self._outputs.items():
             try:
                 if output.send(hands):
@@ -49,12 +66,15 @@ class Publisher:
                 _log.warning("%s: hands cannot be sent: %s", declared.name, error)
 
     def wants(self, avatar: str) -> bool:
-        """Whether anybody has subscribed to the hands of an avatar, by the name of its profile."""
-        return any(output.wants(avatar) for output in self._outputs.values())
+        """Whether anybody receives or records the hands of an avatar, by the name of its profile."""
+        is_taped = avatar in self._taped and self._tape is not None and self._tape.is_recording
+        return is_taped or any(output.wants(avatar) for output in self._outputs.values())
 
     def publish_avatar(self, message: HandsMessage, profile: HandProfile) -> None:
         """Send the hands of an avatar, whose profile is given. Raises `MessageError` as `publish` does."""
         hands = EncodedHands(message)
+        if self._tape is not None and self._tape.is_recording:
+            self._tape.note_avatar(hands.msgpack, profile)
         for declared, output in self._outputs.items():
             try:
                 if output.send_avatar(hands, profile):

@@ -6,6 +6,8 @@ import socket
 import sys
 import threading
 import time
+import warnings
+from collections.abc import Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Final
@@ -13,11 +15,12 @@ from typing import Final
 import viser
 
 from manipnet.page.frames import Frame
+from manipnet.page.hand_choices import HandChoices, is_avatar
+from manipnet.page.hand_look import HandLook, look_of
 from manipnet.page.panel import Panel
 from manipnet.page.rpc import RefusedError, RpcClient, RpcLog
 from manipnet.page.show import Show
 from manipnet.page.web_server import OPERATOR, open_server
-from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.hand_file import read_hand
 
 REFRESH_S: Final = 0.5
@@ -29,7 +32,8 @@ def serve(listener: socket.socket, connection: Connection, hand_file: Path) -> N
     link = RpcClient(connection)
     logging.basicConfig(level=logging.WARNING, handlers=[RpcLog(link)], force=True)
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a visitor who leaves is not worth a log line
-    page = Page(link, read_hand(hand_file))
+    warnings.filterwarnings("ignore", "Queued a ")  # a visitor may leave while something is on its way to him
+    page = Page(link, look_of(read_hand(hand_file)))
     page.open(open_server(listener, "ManipNet Live", page.dropped))
     threading.Thread(target=page.refresh, name="refresh", daemon=True).start()
     page.run()
@@ -39,16 +43,14 @@ def serve(listener: socket.socket, connection: Connection, hand_file: Path) -> N
 class Page:
     """One show for everybody, and a panel for each visitor."""
 
-    def __init__(self, link: RpcClient, hand: Hand) -> None:
-        self._link, self._hand = link, hand
+    def __init__(self, link: RpcClient, look: HandLook) -> None:
+        self._link, self._look = link, look
         self._panels: dict[int, Panel] = {}
 
     def open(self, server: viser.ViserServer) -> None:
         """Set up the scene and let visitors in."""
-        self._show = Show(server, self._hand, self._follow)
-        server.gui.configure_theme(
-            dark_mode=True, show_logo=False, show_share_button=False, brand_color=(88, 166, 255), control_width="medium"
-        )
+        self._show = Show(server, self._look, self._follow)
+        self._hands = HandChoices(self._link, self._show)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
 
@@ -58,15 +60,19 @@ class Page:
         for what, content in self._link.incoming():
             if what == "shape":
                 self._show.add_shape(content)
+            elif what == "avatar":
+                self._show.add_avatar(content)
             elif what == "frame":
                 self._show.add_frame(content)
 
     def dropped(self, name: str, content: bytes) -> str:
-        """Import a mesh file that was dropped on the page; returns the message for its visitor."""
+        """Import a mesh or an avatar that was dropped on the page; returns the message for its visitor."""
         panel = next((panel for panel in self._panels.values() if panel.objects is not None), None)
         if panel is None or panel.objects is None:
             return "only a browser on the server's own machine may import files, and none is open"
         try:
+            if is_avatar(name, content):
+                return panel.wear(name, content)
             return panel.objects.import_mesh(name, content)
         except (RefusedError, ValueError, OSError) as error:
             return str(error)
@@ -82,15 +88,16 @@ class Page:
                     logging.getLogger(__name__).exception("a panel cannot be refreshed")
             time.sleep(max(REFRESH_S - (time.monotonic() - begin_s), 0.1))
 
-    def _follow(self, frame: Frame | None) -> None:
+    def _follow(self, frames: Sequence[Frame]) -> None:
         for panel in list(self._panels.values()):
-            panel.follow(frame)
+            panel.follow(frames)
 
     async def _connected(self, client: viser.ClientHandle) -> None:
-        self._panels[client.client_id] = Panel(self._link.ask, self._show, client, OPERATOR.get())
+        self._panels[client.client_id] = Panel(self._link.ask, self._show, self._hands, client, OPERATOR.get())
         self._link.watch(True)
-        self._show.frame_hands(client.camera)
 
     async def _disconnected(self, client: viser.ClientHandle) -> None:
-        self._panels.pop(client.client_id, None)
+        panel = self._panels.pop(client.client_id, None)
+        if panel is not None:
+            panel.close()
         self._link.watch(bool(self._panels))

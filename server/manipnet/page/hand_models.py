@@ -6,6 +6,8 @@ import numpy as np
 import viser
 
 from manipnet.geometry import Array, matrix_to_quat, mirror_points, mirror_quats
+from manipnet.page.forearm import Forearm
+from manipnet.page.hand_look import HandLook
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.synthesizer import hand_to_world
@@ -14,6 +16,7 @@ from manipnet.wire import HandPose, Side
 SKIN: Final = {"right": (226, 168, 138), "left": (213, 153, 128)}
 PALE: Final = {"right": (176, 164, 158), "left": (168, 156, 151)}
 """The colour of a hand that is held or at rest."""
+NAIL: Final = (238, 190, 172)
 GHOST: Final = (140, 190, 255)
 
 
@@ -32,50 +35,87 @@ class HandModel:
     """One hand in the scene under `name`; `ghost` makes it translucent."""
 
     def __init__(
-        self, scene: viser.SceneApi, name: str, hand: Hand, side: Side, scale: float, ghost: bool = False
+        self, scene: viser.SceneApi, name: str, look: HandLook, side: Side, scale: float, ghost: bool = False
     ) -> None:
         self.side: Side = side
         self.scale = scale
-        self._hand, self._ghost, self._pale = hand, ghost, False
+        self._look, self._hand, self._ghost, self._pale = look, look.hand, ghost, False
+        self._scene, self._name = scene, name
+        hand = look.hand
         positions, matrices = forward_kinematics(hand, hand.skin.bind_angles)
-        quats, vertices, faces = matrix_to_quat(matrices), hand.skin.vertices, hand.skin.faces
+        quats = matrix_to_quat(matrices)
         if side == "left":
-            positions, quats, vertices = mirror_points(positions), mirror_quats(quats), mirror_points(vertices)
-            faces = faces[:, ::-1]
-        self._mesh = scene.add_mesh_skinned(
-            name,
-            scale * vertices,
-            faces,
-            bone_wxyzs=wxyz(quats),
-            bone_positions=scale * positions[: hand.bone_count],
-            skin_weights=_dense_weights(hand),
-            color=GHOST if ghost else SKIN[side],
-            opacity=0.22 if ghost else None,
-            cast_shadow=not ghost,
-            receive_shadow=not ghost,
-        )
+            positions, quats = mirror_points(positions), mirror_quats(quats)
+        self._root = scene.add_frame(name, show_axes=False)
+        self._mesh = self._skinned("skin", look.vertices, look.faces, look.weights, positions, quats, SKIN[side])
+        self._nails: viser.MeshSkinnedHandle | None = None
+        self._nail_bones = np.unique(look.nails.bones)
+        self._arm: Forearm | None = None
+        if not ghost:
+            if len(self._nail_bones):
+                bones = self._nail_bones
+                weights = (look.nails.bones[:, None] == bones).astype(np.float32)
+                nails = look.nails
+                self._nails = self._skinned(
+                    "nails", nails.vertices, nails.faces, weights, positions[bones], quats[bones], NAIL
+                )
+            self._arm = self._forearm()
 
     def pose(self, hand: HandPose, wrist: Array | None = None) -> None:
         """Take the pose of a message's hand, at its own wrist or at another `wrist (7,)`."""
         wrist = hand.wrist if wrist is None else wrist
         positions, quats = world_bones(self._hand, self.side, self.scale, hand.angles, wrist)
-        for bone, position, quat in zip(self._mesh.bones, positions, wxyz(quats), strict=False):
+        turned = wxyz(quats)
+        for bone, position, quat in zip(self._mesh.bones, positions, turned, strict=False):
             bone.position, bone.wxyz = position, quat
-        if not self._ghost and self._pale != (hand.state != "live"):
+        if self._nails is not None:
+            for bone, number in zip(self._nails.bones, self._nail_bones, strict=True):
+                bone.position, bone.wxyz = positions[number], turned[number]
+        if self._arm is None:
+            return
+        if self._pale != (hand.state != "live"):
             self._pale = hand.state != "live"
             self._mesh.color = (PALE if self._pale else SKIN)[self.side]
+            self._arm.paint(self._mesh.color)
+        self._arm.pose(positions[0], turned[0])
 
     def show(self, visible: bool) -> None:
         """Show or hide it."""
-        self._mesh.visible = visible
+        self._root.visible = visible
 
     def remove(self) -> None:
         """Remove it from the scene."""
-        self._mesh.remove()
+        self._root.remove()
 
+    def _skinned(
+        self,
+        part: str,
+        vertices: Array,
+        faces: np.ndarray,
+        weights: np.ndarray,
+        positions: Array,
+        quats: Array,
+        color: tuple[int, int, int],
+    ) -> viser.MeshSkinnedHandle:
+        if self.side == "left":
+            vertices, faces = mirror_points(vertices), faces[:, ::-1]
+        return self._scene.add_mesh_skinned(
+            f"{self._name}/{part}",
+            self.scale * vertices,
+            faces,
+            bone_wxyzs=wxyz(quats),
+            bone_positions=self.scale * positions[: weights.shape[1]],
+            skin_weights=weights,
+            color=GHOST if self._ghost else color,
+            opacity=0.22 if self._ghost else None,
+            cast_shadow=not self._ghost,
+            receive_shadow=not self._ghost,
+        )
 
-def _dense_weights(hand: Hand) -> np.ndarray:
-    """The skin's weights for every bone, `(V, B)` float32."""
-    weights = np.zeros((len(hand.skin.vertices), hand.bone_count), np.float32)
-    np.add.at(weights, (np.arange(len(weights))[:, None], hand.skin.bones), hand.skin.weights)
-    return weights
+    def _forearm(self) -> Forearm:
+        vertices, faces, opacity = self._look.cuff
+        _, rotations = forward_kinematics(self._hand, self._hand.skin.bind_angles)
+        vertices = vertices @ rotations[0]
+        if self.side == "left":
+            vertices, faces = mirror_points(vertices), faces[:, ::-1]
+        return Forearm(self._scene, f"{self._name}/forearm", self.scale * vertices, faces, opacity, SKIN[self.side])

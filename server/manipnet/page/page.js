@@ -1,18 +1,15 @@
-// What the page adds to viser's client: its title, and the import of files that are dropped on it.
+// What the page adds to viser's client: its title, the import of files that are dropped on it, the place of the stage
+// for the style sheet, and keys that mean one thing only.
 document.title = "ManipNet Live";
 
 const veil = document.createElement("div");
-veil.textContent = "Drop a mesh file here: OBJ, PLY, STL or GLB";
-veil.style.cssText =
-  "position:fixed;inset:0;z-index:9999;display:none;align-items:center;justify-content:center;pointer-events:none;" +
-  "font:600 24px sans-serif;color:#fff;background:rgba(30,60,110,.55);border:4px dashed #58a6ff";
+veil.className = "mn-veil";
+veil.textContent = "Drop a mesh (OBJ, PLY, STL, GLB): the chosen body carries it\nor an avatar (VRM, GLB with a skeleton): the actor gets its hands";
 document.body.append(veil);
 
 const note = document.createElement("div");
 note.id = "drop-note";
-note.style.cssText =
-  "position:fixed;left:50%;bottom:28px;transform:translateX(-50%);z-index:9999;display:none;max-width:70%;" +
-  "padding:10px 18px;border-radius:8px;font:15px sans-serif;color:#fff;background:#22304a";
+note.className = "mn-note";
 document.body.append(note);
 
 function notify(text) {
@@ -41,3 +38,37 @@ addEventListener("drop", (event) => {
   veil.style.display = "none";
   for (const file of event.dataTransfer.files) importFile(file);
 });
+
+// The style sheet puts the frame and the card over the stage, which is the largest canvas.
+function placeStage() {
+  const area = (canvas) => canvas.clientWidth * canvas.clientHeight;
+  const canvas = [...document.querySelectorAll("canvas")].sort((a, b) => area(b) - area(a))[0];
+  if (!canvas) return;
+  const seen = { left: 0, top: 0, right: innerWidth, bottom: innerHeight };
+  for (let box = canvas; box; box = box.parentElement) {
+    const { left, top, right, bottom } = box.getBoundingClientRect();
+    if (box !== canvas && getComputedStyle(box).overflow === "visible") continue;
+    seen.left = Math.max(seen.left, left);
+    seen.top = Math.max(seen.top, top);
+    seen.right = Math.min(seen.right, right);
+    seen.bottom = Math.min(seen.bottom, bottom);
+  }
+  const place = { left: seen.left, top: seen.top, width: seen.right - seen.left, height: seen.bottom - seen.top };
+  for (const [name, pixels] of Object.entries(place))
+    document.documentElement.style.setProperty(`--mn-${name}`, `${pixels}px`);
+}
+setInterval(placeStage, 250);
+addEventListener("resize", placeStage);
+
+// While a take is shown, arrows step through it and do not turn the camera, for which viser listens at the document.
+document.documentElement.addEventListener("keydown", (event) => {
+  if (event.key.startsWith("Arrow") && document.querySelector(".mn-take")) event.stopPropagation();
+});
+
+// A button or slider that was clicked does not keep the keys: space would click it again.
+addEventListener("pointerup", () =>
+  setTimeout(() => {
+    const focused = document.activeElement;
+    if (focused && focused.matches("button, [role=slider], [role=tab], input[type=checkbox]")) focused.blur();
+  }),
+);

@@ -1,47 +1,67 @@
 """The panel of one visitor: the state of the server for everybody, and controls for operators."""
 
-import math
-from typing import Any
+import time
+from collections.abc import Sequence
+from typing import Any, Final
 
 import viser
 
+from manipnet.page import html
 from manipnet.page.calibrate_tab import CalibrateTab
 from manipnet.page.charts import History, Plots
-from manipnet.page.controls import Action, Ask, by_visitor
+from manipnet.page.controls import Action, Ask
 from manipnet.page.doctor_text import doctor_text
 from manipnet.page.frames import Frame
+from manipnet.page.framing import FollowCamera
+from manipnet.page.hand_choices import HandChoices
+from manipnet.page.hands_tab import HandsTab
 from manipnet.page.markdown import escape
 from manipnet.page.objects_tab import ObjectsTab
-from manipnet.page.overlays import OVERLAYS
+from manipnet.page.refusals import refusals_text
 from manipnet.page.rpc import RefusedError
 from manipnet.page.show import Show
+from manipnet.page.state import STALE_S, Verdict, ago, verdict
+from manipnet.page.take_view import TakeView
 from manipnet.page.takes_tab import TakesTab
+from manipnet.page.transport import Transport
+from manipnet.page.view_tab import ViewTab
 
-DOTS = {"live": "●", "hold": "◐", "rest": "○"}
-NOTE_S = 6.0
+DOTS: Final = {"live": "●", "hold": "◐", "rest": "○"}
+NOTE_S: Final = 6.0
+NARROW_PX: Final = 900
+"""In a window that is narrower, the panel *Health* begins folded, so that the stage has room."""
 
 
 class Panel:
     """The panel beside the scene. A visitor on the server's own machine is an operator; the others can only watch."""
 
-    def __init__(self, ask: Ask, show: Show, client: viser.ClientHandle, operator: bool) -> None:
-        self._ask, self._show, self._client = ask, show, client
+    def __init__(self, ask: Ask, show: Show, choices: HandChoices, client: viser.ClientHandle, operator: bool) -> None:
+        self._ask, self._show, self._choices, self._client = ask, show, choices, client
+        self._hands: HandsTab | None = None
         self.objects: ObjectsTab | None = None
         self._takes: TakesTab | None = None
         self._calibration: CalibrateTab | None = None
         self._paused = False
+        self._camera = FollowCamera(client)
+        self._view = TakeView(client, show.look, self._camera)
         gui = client.gui
         gui.main_panel.dock_right()
-        self._headline = gui.add_markdown("**connecting …**")
+        self._headline = gui.add_html("")
+        self._warnings = gui.add_markdown("")
+        self._stage = gui.add_html("")
+        self._transport = Transport(ask, client, self._view, self.perform, operator)
         if operator:
             self._controls(gui)
-            tabs = gui.add_tab_group()
-            with tabs.add_tab("Scene"):
-                self._scene(gui)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("View"):
+            self._view_tab = ViewTab(ask, show, client, self._camera, self.perform, operator)
+        if operator:
             with tabs.add_tab("Objects"):
                 self.objects = ObjectsTab(ask, client, self.perform)
+            with tabs.add_tab("Hands"):
+                self._hands = HandsTab(choices, gui, self.perform)
             with tabs.add_tab("Takes"):
-                self._takes = TakesTab(ask, show, gui, self.perform)
+                self._takes = TakesTab(ask, client, self._transport, self.perform)
             with tabs.add_tab("Calibrate"):
                 self._calibration = CalibrateTab(ask, gui, self.perform)
         side = gui.add_panel()
@@ -50,32 +70,32 @@ class Panel:
             self._doctor = gui.add_markdown("")
             self._plots = Plots(gui)
         side.dock_left()
+        if client.camera.image_width < NARROW_PX:
+            side.minimize()
 
     def refresh(self) -> None:
         """Show the newest state of the server; called twice a second."""
         try:
             self._refresh()
         except RefusedError as error:
-            self._headline.content = f"**The server does not answer:** {escape(error)}"
+            self._headline.content = html.state_line(Verdict("bad", "The server does not answer"), str(error))
 
-    def _refresh(self) -> None:
-        history = next(iter(self._show.histories.values()), None) or History()
-        status = self._ask(op="status")
-        self._headline.content = _headline(self._show, status, history)
-        self._health.content = _health(status)
-        self._doctor.content = doctor_text(status["doctor"])
-        self._plots.show(history)
-        if self.objects is not None and self._takes is not None and self._calibration is not None:
-            self._show_paused(_paused(status))
-            answer = self._ask(op="objects")
-            self.objects.refresh(answer)
-            self._calibration.refresh(answer["bodies"])
-            self._takes.refresh()
+    def close(self) -> None:
+        """The visitor has left."""
+        self._transport.close()
+        self._view_tab.close()
 
-    def follow(self, frame: Frame | None) -> None:
-        """Move the gizmo with its prop, as it is in a live frame; None hides it while a recording is shown."""
+    def follow(self, frames: Sequence[Frame]) -> None:
+        """Move the camera and the gizmo with what was drawn live, unless this visitor watches a take."""
+        if self._view.recording is None:
+            self._camera.follow(self._show.focus)
         if self.objects is not None:
-            self.objects.follow(frame)
+            self.objects.follow(frames if self._view.recording is None else ())
+
+    def wear(self, name: str, content: bytes) -> str:
+        """Import the hands of an avatar file for the chosen actor. Raises `RefusedError` and `ValueError`."""
+        assert self._hands is not None
+        return self._hands.use(self._choices.add(name, content))
 
     def perform(self, action: Action) -> None:
         """Run an action and notify the visitor of its message or its error."""
@@ -87,22 +107,55 @@ class Panel:
             if text:
                 self._client.add_notification("Done", text, color="green", auto_close_seconds=NOTE_S)
 
+    def _refresh(self) -> None:
+        now_s = time.monotonic()
+        history = next(iter(self._show.histories.values()), None) or History()
+        status = self._ask(op="status")
+        state = verdict(status, history.rate_hz(now_s))
+        recording = self._ask(op="recordings")["recording"]
+        self._transport.refresh(recording)
+        self._headline.content = self._headline_of(state, history)
+        waits = state.text != "Paused" and not self._show_is_fresh(history, now_s) and self._view.recording is None
+        self._stage.content = html.recording_mark(recording) + (html.card(state, status) if waits else "")
+        self._warnings.content = "\n\n".join(_warnings(status))
+        self._health.content = _health(status)
+        self._doctor.content = doctor_text(status["doctor"])
+        self._plots.show(history)
+        self._view_tab.refresh(next(iter(status["actors"].values()))["look_ahead_s"])
+        if not self._show.live and self._view.recording is None:
+            self._camera.follow(None)
+        if self.objects is not None and self._takes is not None and self._calibration is not None:
+            self._show_paused(any(actor.get("paused") for actor in status["actors"].values()))
+            answer = self._ask(op="objects")
+            self.objects.refresh(answer)
+            self._calibration.refresh(answer["bodies"])
+            self._takes.refresh()
+            if self._hands is not None:
+                self._hands.refresh(status)
+
+    @staticmethod
+    def _show_is_fresh(history: History, now_s: float) -> bool:
+        return now_s - history.newest_s <= STALE_S
+
+    def _headline_of(self, state: Verdict, history: History) -> str:
+        if (shown := self._view.recording) is not None:
+            return html.take_line(shown.name, shown.seconds)
+        detail = state.detail
+        if self._show.live and history.rate_hz(time.monotonic()):
+            latency = next(iter(self._show.live.values())).message.latency_ms
+            detail += f" · {latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms processing"
+        return html.state_line(state, detail)
+
     def _controls(self, gui: viser.GuiApi) -> None:
         self._pause = gui.add_button("Pause", icon=viser.Icon.PLAYER_PAUSE, hint="keep the hands as they are")
         rest = gui.add_button(
             "Rest", icon=viser.Icon.HAND_STOP, hint="ease both hands to the rest pose and start again from there"
         )
-        self._on_click(self._pause, self._toggle_pause)
-        self._on_click(rest, self._asking(op="rest"))
+        self._pause.on_click(lambda _: self.perform(self._toggle_pause))
+        rest.on_click(lambda _: self.perform(self._rest))
 
-    def _scene(self, gui: viser.GuiApi) -> None:
-        slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
-        slider.on_update(by_visitor(lambda: self.perform(self._asking(op="look_ahead", seconds=1e-3 * slider.value))))
-        for name, label in OVERLAYS.items():
-            box = gui.add_checkbox(label, name in self._show.overlays)
-            box.on_update(lambda event, name=name: self._show.set_overlay(name, event.target.value))
-        center = gui.add_button("Center view", icon=viser.Icon.FOCUS_2)
-        self._on_click(center, self._show.recenter)
+    def _rest(self) -> None:
+        self._ask(op="rest")
 
     def _toggle_pause(self) -> None:
         self._ask(op="pause", on=not self._paused)
@@ -112,19 +165,6 @@ class Panel:
             self._paused = paused
             self._pause.label = "Resume" if paused else "Pause"
             self._pause.icon = viser.Icon.PLAYER_PLAY if paused else viser.Icon.PLAYER_PAUSE
-
-    def _asking(self, **request: Any) -> Action:
-        def ask() -> None:
-            self._ask(**request)
-
-        return ask
-
-    def _on_click(self, button: viser.GuiButtonHandle, action: Action) -> None:
-        button.on_click(lambda _: self.perform(action))
-
-
-def _headline(show: Show, status: dict[str, Any], history: History) -> str:
-    return "\n\n".join([*_warnings(status), _activity(show, status, history)])
 
 
 def _warnings(status: dict[str, Any]) -> list[str]:
@@ -139,22 +179,6 @@ def _warnings(status: dict[str, Any]) -> list[str]:
     return warnings
 
 
-def _activity(show: Show, status: dict[str, Any], history: History) -> str:
-    frames = show.live.values()
-    if not frames:
-        return "○ **Waiting for bodies.** *Health* says why none are used."
-    latency = next(iter(frames)).message.latency_ms
-    what = "◐ **Paused**" if _paused(status) else "● **Live**"
-    if show.recording is not None:
-        what = f"▶ **{escape(show.recording.name)}**"
-    waits = f"{latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms processing"
-    return f"{what} · {history.rate_hz:.0f} hands/s\n\n{waits}"
-
-
-def _paused(status: dict[str, Any]) -> bool:
-    return any(actor.get("paused") for actor in status["actors"].values())
-
-
 def _health(status: dict[str, Any]) -> str:
     rows = ["| | body | Hz | last seen |", "|---|---|--:|--:|"]
     hands = []
@@ -162,18 +186,19 @@ def _health(status: dict[str, Any]) -> str:
         if len(status["actors"]) > 1:
             rows.append(f"| | **{escape(name)}** | | |")
         for body, health in actor["bodies"].items():
-            age_s, rate_hz = health["age_s"], health["rate_hz"]
-            age = "never" if age_s is None or not math.isfinite(age_s) else _ago(age_s)
-            rows.append(f"| {DOTS[health['state']]} | {escape(body)} | {rate_hz or 0.0:.0f} | {age} |")
-        for side, hand in actor["hands"].items():
-            hands.append(
-                f"{side} hand **{hand['state']}**" + (f" on {escape(hand['object'])}" if hand["object"] else "")
+            carried = actor.get("objects", {}).get(body, body)
+            label = escape(body) if carried == body else f"{escape(body)} ({escape(carried)})"
+            rows.append(
+                f"| {DOTS[health['state']]} | {label} | {health['rate_hz'] or 0.0:.0f} | {ago(health['age_s'])} |"
             )
-    counters = status["counters"]
-    lost = sum(sum(counters.get(name, {}).values()) for name in ("frames_dropped", "bodies_rejected"))
-    refused = f"{lost} frames and bodies refused" if lost else "no frame or body refused"
-    return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, f"{refused} since the server started"])
+        for side, hand in actor["hands"].items():
+            hands.append(f"{side} hand **{hand['state']}**{_on(hand['object'], actor)}")
+    return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, refusals_text(status.get("drops", {}))])
 
 
-def _ago(age_s: float) -> str:
-    return f"{1e3 * age_s:.0f} ms ago" if age_s < 1.0 else f"{age_s:.0f} s ago"
+def _on(body: str | None, actor: dict[str, Any]) -> str:
+    """What a hand is at: its body, and the object that this carries if it has another name."""
+    if body is None:
+        return ""
+    carried = actor.get("objects", {}).get(body, body)
+    return f" on {escape(body)}" if carried == body else f" on {escape(body)} ({escape(carried)})"

@@ -52,8 +52,8 @@ def is_own_page(headers: Any) -> bool:
     return _ORIGIN.fullmatch(f"http://{host}") is not None and origin in (None, f"http://{host}")
 
 
-def protect(response: Response, script: str) -> None:
-    """Put `script` into a page, and let the browser run it and viser's client, but nothing else.
+def protect(response: Response, script: str, style: str) -> None:
+    """Put `script` and `style` into a page, and let the browser run it and viser's client, but nothing else.
 
     Raises `PolicyError`.
     """
@@ -65,7 +65,7 @@ def protect(response: Response, script: str) -> None:
     page = page.replace("<script ", f'<script nonce="{nonce}" ', 1)
     page = page.replace(dataset, f"{dataset}const nonce=document.currentScript.nonce;", 1)
     page = page.replace(module, f"{module}e.nonce=nonce;", 1)
-    page = page.replace("</body>", f'<script nonce="{nonce}">{script}</script></body>', 1)
+    page = page.replace("</body>", f'<style>{style}</style><script nonce="{nonce}">{script}</script></body>', 1)
     response.body = page.encode("utf-8")
     del response.headers["Content-Length"]
     response.headers["Content-Length"] = str(len(response.body))

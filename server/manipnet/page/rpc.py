@@ -4,7 +4,7 @@ import contextlib
 import itertools
 import logging
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from multiprocessing.connection import Connection
@@ -58,6 +58,10 @@ class RpcClient:
     def watch(self, watched: bool) -> None:
         """Report whether a browser is open."""
         self._send("watched", watched)
+
+    def show_hands(self, avatars: Iterable[str]) -> None:
+        """Ask for the hands of these avatars, and of no others."""
+        self._send("hands", tuple(avatars))
 
     def log(self, level: int, text: str) -> None:
         """Send a line to the server's log."""

@@ -1,4 +1,4 @@
-"""The surroundings of the hands: lights, a round table, and the first view of each camera."""
+"""The surroundings of the hands: lights, and a round table below everything that was shown."""
 
 from typing import Final
 
@@ -7,64 +7,55 @@ import viser
 
 from manipnet.geometry import Array
 
-TABLE_M: Final = (0.62, 0.03)
+TABLE_M: Final = (0.75, 0.03)
 """Radius and thickness."""
-TABLE_COLOR: Final = (66, 71, 80)
-VIEW: Final = np.array([0.22, 0.50, 0.85])
-"""Offset of the camera from the hands."""
-VIEW_M: Final = 0.92
-KEY_M, RIM_M = np.array([0.35, 1.4, 0.55]), np.array([-0.8, 0.6, -0.9])
-"""Offsets of the lights from the hands."""
-FIELD_OF_VIEW_RAD: Final = 0.70
+TABLE_COLOR: Final = (58, 63, 72)
+EDGE_COLOR: Final = (96, 104, 118)
+GAP_M: Final = 0.001
+"""The table lies this far below the lowest point, so that the faces of a prop that stands on it do not flicker."""
+KEY, RIM = (0.35, 1.4, 0.55), (-0.8, 0.6, -0.9)
+"""The directions from which the lights shine."""
 
 
-class Scenery:
-    """The lights and the table. The table stands below everything that has been shown so far."""
+def add_lights(scene: viser.SceneApi) -> None:
+    """The lights of every visitor's scene."""
+    scene.set_up_direction("+y")
+    scene.configure_default_lights(enabled=False)
+    scene.configure_environment_map("studio", environment_intensity=0.22)
+    scene.add_light_hemisphere("/light/sky", sky_color=(255, 250, 244), ground_color=(40, 44, 54), intensity=0.4)
+    scene.add_light_directional("/light/key", color=(255, 240, 222), intensity=2.3, cast_shadow=True, position=KEY)
+    scene.add_light_directional("/light/rim", color=(160, 195, 255), intensity=1.1, cast_shadow=False, position=RIM)
 
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._scene = scene
-        self._table: viser.CylinderHandle | None = None
-        self._center = np.zeros(3)
-        scene.set_up_direction("+y")
-        scene.configure_default_lights(enabled=False)
-        scene.configure_environment_map("studio", environment_intensity=0.22)
-        scene.add_light_hemisphere("/light/sky", sky_color=(255, 250, 244), ground_color=(40, 44, 54), intensity=0.4)
-        self._key = scene.add_light_directional("/light/key", color=(255, 240, 222), intensity=2.3, cast_shadow=True)
-        self._rim = scene.add_light_directional("/light/rim", color=(160, 195, 255), intensity=1.1, cast_shadow=False)
 
-    @property
-    def placed(self) -> bool:
-        """Whether anything has been shown."""
-        return self._table is not None
+class Table:
+    """A round table under `name`. It is there from the beginning, at the world's origin."""
 
-    def place(self, points: Array, floor_m: float) -> None:
-        """Place the table at the height `floor_m`, below `points (n, 3)`; cameras look at the middle of the points."""
-        self._center = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        x, _, z = self._center
-        if self._table is not None:
-            self._table.remove()
-        self._table = self._scene.add_cylinder(
-            "/table",
-            *TABLE_M,
-            color=TABLE_COLOR,
-            radial_segments=128,
-            position=(x, floor_m - 0.5 * TABLE_M[1], z),
-            wxyz=(np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0),  # viser's cylinders stand along z
+    def __init__(self, scene: viser.SceneApi, name: str) -> None:
+        self._frame = scene.add_frame(name, show_axes=False, wxyz=(np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0))
+        # viser's cylinders stand along z
+        radius_m, thickness_m = TABLE_M
+        scene.add_cylinder(
+            f"{name}/top", radius_m, thickness_m, color=TABLE_COLOR, radial_segments=160, cast_shadow=False
+        )
+        scene.add_cylinder(
+            f"{name}/edge",
+            radius_m + 0.006,
+            0.6 * thickness_m,
+            color=EDGE_COLOR,
+            radial_segments=160,
             cast_shadow=False,
         )
-        self._key.position = tuple(self._center + KEY_M)
-        self._rim.position = tuple(self._center + RIM_M)
+        self.place(np.zeros((1, 3)), 0.0)
+
+    def place(self, points: Array, floor_m: float) -> None:
+        """Put the table below `points (n, 3)`, of which the lowest has the height `floor_m`."""
+        x, _, z = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        self._top_m = floor_m - GAP_M
+        self._frame.position = (x, self._top_m - 0.5 * TABLE_M[1], z)
 
     def lower(self, floor_m: float) -> None:
-        """Lower the table to `floor_m` if it is above."""
-        if self._table is not None and floor_m < self._table.position[1] + 0.5 * TABLE_M[1]:
-            x, _, z = self._table.position
-            self._table.position = (x, floor_m - 0.5 * TABLE_M[1], z)
-
-    def look(self, camera: viser.CameraHandle) -> None:
-        """Point a visitor's camera at the hands."""
-        back = VIEW / np.linalg.norm(VIEW)
-        camera.up_direction = (0.0, 1.0, 0.0)
-        camera.fov = FIELD_OF_VIEW_RAD
-        camera.position = tuple(self._center + VIEW_M * back)
-        camera.look_at = self._center
+        """Lower the table below `floor_m` if it is above."""
+        if floor_m - GAP_M < self._top_m:
+            x, _, z = self._frame.position
+            self._top_m = floor_m - GAP_M
+            self._frame.position = (x, self._top_m - 0.5 * TABLE_M[1], z)

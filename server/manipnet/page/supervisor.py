@@ -57,6 +57,10 @@ class LivePage:
         """Whether a browser is open; only then `see` is worth calling."""
         self._arrived, self._sending = threading.Condition(), threading.Lock()
         self._newest: dict[str, tuple[Frame, Sequence[Shape]]] = {}
+        self._avatars: dict[str, HandsMessage] = {}
+        """The newest hands of each avatar that were not sent yet."""
+        self._shown_hands = frozenset[str]()
+        """The names of the avatars that the page shows."""
         self._stopping = threading.Event()
         self._wake, self._woken = socket.socketpair()
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
@@ -72,6 +76,16 @@ class LivePage:
             if message.actor in self._newest:
                 self._telemetry.count("page_frames", fate="skipped")
             self._newest[message.actor] = frame, [prop.shape for prop in actor.props]
+            self._arrived.notify()
+
+    def wants(self, avatar: str) -> bool:
+        """Whether the page shows the hands of an avatar."""
+        return self.watched and avatar in self._shown_hands
+
+    def see_avatar(self, message: HandsMessage) -> None:
+        """Offer the hands of an avatar, as `see` offers those of its actor."""
+        with self._arrived:
+            self._avatars[message.hand or ""] = message
             self._arrived.notify()
 
     def stop(self) -> None:
@@ -119,11 +133,12 @@ class LivePage:
             sender.start()
             self._listen_to(ours)
         finally:
-            self.watched = False
+            self.watched, self._shown_hands = False, frozenset()
             child.close(STOP_S)
             child.kill()
             with self._arrived:
                 self._newest.clear()
+                self._avatars.clear()
                 self._arrived.notify()
             sender.join()
 
@@ -138,6 +153,8 @@ class LivePage:
                 return
             if what == "watched":
                 self.watched = content
+            elif what == "hands":
+                self._shown_hands = frozenset(content)
             elif what == "ask":
                 number, request = content
 
@@ -167,7 +184,10 @@ class LivePage:
                 if not self._newest:
                     self._arrived.wait(1.0)
                 newest, self._newest = list(self._newest.values()), {}
+                avatars, self._avatars = list(self._avatars.values()), {}
             begin_s = time.monotonic()
+            for message in avatars:
+                self._send_message(ours, "avatar", message)
             for frame, shapes in newest:
                 for shape in shapes:
                     if not any(shape.content_hash in known for known in sent.values()):

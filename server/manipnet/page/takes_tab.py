@@ -1,93 +1,148 @@
-"""The tab that records takes and plays them back."""
+"""The tab that names the next take, and keeps the takes: show, describe, rename, download and delete."""
 
-import threading
 import time
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import viser
 
 from manipnet.page.controls import Ask, Perform, by_visitor
 from manipnet.page.markdown import escape
 from manipnet.page.playback import read_recording
-from manipnet.page.show import Show
+from manipnet.page.transport import Transport
 
-PLAY_HZ: Final = 30.0
 NONE: Final[str] = "none"
+LOOK_EVERY_S: Final = 2.0
+"""The folder is read this often, and after every change that is made here."""
 
 
 class TakesTab:
-    """Records, shows a recording at any instant, and returns to the live session."""
+    """Slate and number of the next take, and everything about those in the folder."""
 
-    def __init__(self, ask: Ask, show: Show, gui: viser.GuiApi, perform: Perform) -> None:
-        self._ask, self._show = ask, show
-        self._folder, self._recording = Path(), False
-        self._playing = threading.Event()
-        self._record = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color="red")
-        self._progress = gui.add_markdown("")
-        gui.add_divider()
+    def __init__(self, ask: Ask, client: viser.ClientHandle, transport: Transport, perform: Perform) -> None:
+        self._ask, self._client, self._transport, self._perform = ask, client, transport, perform
+        self._folder, self._takes = Path(), dict[str, dict[str, Any]]()
+        self._looked_s = float("-inf")
+        self._shown: dict[str, Any] | None = None
+        gui = client.gui
+        gui.add_markdown("**Next take**")
+        self._slate = gui.add_text("Slate", "", hint="with a slate, takes are called SLATE take NUMBER")
+        self._number = gui.add_number("Number", 1, min=0, max=9999, step=1)
+        self._preview = gui.add_markdown("")
+        gui.add_markdown("**Takes**")
         self._take = gui.add_dropdown("Take", (NONE,))
-        self._open = gui.add_button("Show this take", icon=viser.Icon.MOVIE)
-        self._scrub = gui.add_slider("Time, s", 0.0, 1.0, 0.01, initial_value=0.0, visible=False)
-        self._play = gui.add_button("Play", icon=viser.Icon.PLAYER_PLAY, visible=False)
-        self._live = gui.add_button("Back to live", icon=viser.Icon.BROADCAST, visible=False)
-        self._record.on_click(lambda _: perform(self._toggle_record))
-        self._open.on_click(lambda _: perform(self._show_take))
-        self._play.on_click(lambda _: perform(self._toggle_play))
-        self._live.on_click(lambda _: perform(self._back))
-        self._scrub.on_update(by_visitor(lambda: show.seek(self._scrub.value)))
+        self._facts = gui.add_markdown("")
+        show = gui.add_button("Show this take", icon=viser.Icon.MOVIE)
+        self._name = gui.add_text("Name", "")
+        self._own_slate = gui.add_text("Its slate", "")
+        self._own_number = gui.add_number("Its number", 0, min=0, max=9999, step=1)
+        self._note = gui.add_text("Note", "", multiline=True)
+        download = gui.add_button("Download", icon=viser.Icon.DOWNLOAD)
+        delete = gui.add_button("Delete …", icon=viser.Icon.TRASH, color="gray")
+        show.on_click(lambda _: perform(self._show_take))
+        download.on_click(lambda _: perform(self._download))
+        delete.on_click(lambda _: self._confirm_delete())
+        self._take.on_update(by_visitor(self._show_facts))
+        for handle in (self._slate, self._number):
+            handle.on_update(by_visitor(self._name_next))
+        for key, handle in (
+            ("name", self._name),
+            ("slate", self._own_slate),
+            ("number", self._own_number),
+            ("note", self._note),
+        ):
+            handle.on_update(by_visitor(lambda key=key, handle=handle: perform(lambda: self._edit(key, handle.value))))
 
     def refresh(self) -> None:
-        """Show the recording in progress and offer the takes in the folder."""
-        answer = self._ask(op="recordings")
-        self._folder = Path(answer["folder"])
-        takes = tuple(answer["recordings"]) or (NONE,)
-        if self._take.options != takes:
-            self._take.options = takes
-        now = answer["recording"]
-        if (now is not None) != self._recording:
-            self._recording = now is not None
-            self._record.label = "Stop recording" if self._recording else "Record"
-            self._record.icon = viser.Icon.PLAYER_STOP if self._recording else viser.Icon.PLAYER_RECORD
-        recording = f"● **{escape(now['name'])}** · {now['seconds']:.0f} s" if now else ""
-        self._progress.content = recording or f"Takes are saved in {escape(self._folder)}"
+        """Offer the takes in the folder."""
+        self._show_next()
+        if time.monotonic() - self._looked_s > LOOK_EVERY_S:
+            self._look()
 
-    def _toggle_record(self) -> str | None:
-        if not self._recording:
-            self._ask(op="record")
-            return None
-        answer = self._ask(op="stop_recording")
-        return f"{answer['name']}: {answer['hands']} hands messages, {answer['bodies']} body frames"
+    def _look(self) -> None:
+        self._looked_s = time.monotonic()
+        answer = self._ask(op="recordings", notes=True)
+        self._folder = Path(answer["folder"])
+        self._takes = {take["name"]: take for take in answer["takes"]}
+        names = tuple(self._takes) or (NONE,)
+        if self._take.options != names:
+            self._take.options = names
+        if self._takes.get(self._take.value) != self._shown:
+            self._show_facts()
+
+    def _show_facts(self) -> None:
+        take = self._shown = self._takes.get(self._take.value)
+        if take is None:
+            self._facts.content = f"Takes are saved in {escape(self._folder)}"
+            return
+        recorded = time.strftime("%Y-%m-%d %H:%M", time.localtime(take["changed_s"]))
+        self._facts.content = f"{recorded} · {take['bytes'] / 1e6:.1f} MB in {escape(self._folder)}"
+        self._name.value = take["name"].removesuffix(".mcap")
+        self._own_slate.value, self._note.value = take.get("slate", ""), take.get("note", "")
+        self._own_number.value = take.get("number", 0)
+
+    def _name_next(self) -> None:
+        slate = self._slate.value.strip()
+        self._transport.about = {"slate": slate, "number": int(self._number.value)} if slate else {}
+        self._show_next()
+
+    def _show_next(self) -> None:
+        about = self._transport.about
+        if about and self._number.value != about["number"]:
+            self._number.value = about["number"]
+        name = f"{about['slate']} take {about['number']}" if about else "take, with date and time"
+        if self._preview.content != (text := f"Record makes: {escape(name)}"):
+            self._preview.content = text
+
+    def _chosen(self) -> dict[str, Any]:
+        if self._take.value not in self._takes:
+            raise ValueError("there is no take yet; press Record")
+        return self._takes[self._take.value]
 
     def _show_take(self) -> None:
-        if self._take.value == NONE:
-            raise ValueError("there is no take yet; press Record")
-        recording = read_recording(self._folder / self._take.value)
-        self._pause()
-        self._show.play(recording)
-        self._scrub.max, self._scrub.value = max(round(recording.seconds, 2), 0.01), 0.0
-        self._scrub.visible = self._play.visible = self._live.visible = True
+        self._transport.show(read_recording(self._folder / self._chosen()["name"]))
 
-    def _back(self) -> None:
-        self._pause()
-        self._show.play(None)
-        self._scrub.visible = self._play.visible = self._live.visible = False
+    def _edit(self, key: str, value: Any) -> str | None:
+        take = self._chosen()
+        before = take["name"].removesuffix(".mcap") if key == "name" else take.get(key, 0 if key == "number" else "")
+        if value == before:
+            return None
+        try:
+            answer = self._ask(op="edit_recording", recording=take["name"], **{key: value})
+        except Exception:
+            self._show_facts()  # what was refused must not stay in the field
+            raise
+        self._look()
+        self._take.value = answer["name"]
+        self._show_facts()
+        return f"{answer['name']}: {key} is kept"
 
-    def _toggle_play(self) -> None:
-        if self._playing.is_set():
-            self._pause()
+    def _download(self) -> str:
+        take = self._chosen()
+        self._client.send_file_download(take["name"], (self._folder / take["name"]).read_bytes(), save_immediately=True)
+        return f"{take['name']} goes to the browser's downloads"
+
+    def _confirm_delete(self) -> None:
+        take = self._takes.get(self._take.value)
+        if take is None:
             return
-        self._playing.set()
-        self._play.label, self._play.icon = "Pause playback", viser.Icon.PLAYER_PAUSE
-        threading.Thread(target=self._run, name="playback", daemon=True).start()
+        gui = self._client.gui
+        modal = gui.add_modal("Delete this take?")
+        with modal:
+            gui.add_markdown(f"**{escape(take['name'])}** ({take['bytes'] / 1e6:.1f} MB) cannot be brought back.")
+            delete = gui.add_button("Delete it", icon=viser.Icon.TRASH, color="red")
+            keep = gui.add_button("Keep it", color="gray")
 
-    def _pause(self) -> None:
-        self._playing.clear()
-        self._play.label, self._play.icon = "Play", viser.Icon.PLAYER_PLAY
+        def end(confirmed: bool) -> None:
+            modal.close()
+            if confirmed:
+                self._perform(lambda: self._delete(take["name"]))
 
-    def _run(self) -> None:
-        """Play from the position of the slider, again and again."""
-        while self._playing.is_set():
-            self._scrub.value = (self._scrub.value + 1.0 / PLAY_HZ) % self._scrub.max
-            self._show.seek(self._scrub.value)
-            time.sleep(1.0 / PLAY_HZ)
+        delete.on_click(lambda _: end(True))
+        keep.on_click(lambda _: end(False))
+
+    def _delete(self, name: str) -> str:
+        self._ask(op="delete_recording", recording=name)
+        self._look()
+        self._show_facts()
+        return f"{name} is deleted"

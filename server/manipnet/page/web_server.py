@@ -26,6 +26,7 @@ OPERATOR: Final = ContextVar("OPERATOR", default=False)
 """Whether the visitor may change anything: a browser on this machine that shows a page of this machine."""
 SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
 """What the page adds to viser's client: a title, and the import of files that are dropped on it."""
+STYLE: Final = files("manipnet.page").joinpath("page.css").read_text(encoding="utf-8")
 DROP_PATH: Final = "/drop"
 OPEN_S: Final = 10.0
 """A visitor that has not sent a whole request after this time is cut off."""
@@ -86,7 +87,7 @@ def _served_on(listener: socket.socket, dropped: Dropped) -> Iterator[None]:
                 del request.headers["Accept-Encoding"]
             response = process_request(connection, request)
             if response is not None and policy.is_page(response, request):
-                policy.protect(response, SCRIPT)
+                policy.protect(response, SCRIPT, STYLE)
             return response
 
         return original(

@@ -4,10 +4,12 @@
 |---|---|
 | `/bodies` | the body message of `docs/protocol-in.md`, JSON |
 | `/hands` | the hands message of `docs/protocol.md`, msgpack |
+| `hand/NAME` | the same message of an avatar, without bodies, which `/hands` has |
 | `/tf` | Foxglove's FrameTransforms, JSON: bodies and OpenXR joints in the frame `world` |
 
 Log times are this machine's clock at the arrival, in nanoseconds; the messages hold the sender's clock. The meshes are
-attachments, and the rig and the hash of the model are metadata; both come before the first message. Chunks are small
+attachments, and the rig and the hash of the model are metadata; both come before the first message. The profile of an
+avatar that joins later is metadata before the first message of its topic. Chunks are small
 and are handed to the operating system at once, so a process that is killed loses a fraction of a second. No reader here
 needs the end of a file. Sources: mcap.dev/spec; docs.foxglove.dev, "Message schemas", FrameTransforms.
 """
@@ -15,7 +17,7 @@ needs the end of a file. Sources: mcap.dev/spec; docs.foxglove.dev, "Message sch
 import json
 import logging
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -34,8 +36,10 @@ from manipnet.wire.hand_names import OPENXR_JOINT_NAMES
 BODIES: Final = "/bodies"
 HANDS: Final = "/hands"
 TF: Final = "/tf"
+AVATAR: Final = "hand/"
+"""The topic of an avatar begins with this; the name of its profile follows."""
 ABOUT: Final = "manipnet"
-"""Name of the metadata record, which holds model, model_hash, rig and everything else that the writer knew."""
+"""Name of the metadata records, which hold model, model_hash, rig and everything else that the writer knew."""
 FLUSH_NS: Final = 250_000_000
 """A killed process loses at most this much, by the clock of the log times."""
 MAX_RECORD_BYTES: Final = 1 << 28
@@ -109,10 +113,16 @@ class RecordingWriter:
         poses = [(body.name or str(body.id), (*body.p, *body.q)) for body in frame.bodies if body.tracked]
         self._add(TF, _transforms(poses, now_ns), now_ns)
 
+    def add_about(self, about: Mapping[str, str]) -> None:
+        """Write metadata that became known after the beginning."""
+        self._writer.add_metadata(ABOUT, dict(about))
+
     def write_hands(self, message: HandsMessage, now_ns: int) -> None:
         """Write a message that was published at `now_ns`. Raises `MessageError` for numbers that are not finite."""
-        self._add(HANDS, encode_msgpack(message), now_ns)
         actor = message.actor
+        if message.hand is not None:
+            message, actor = replace(message, bodies=()), f"{actor}/{message.hand}"
+        self._add(HANDS if message.hand is None else AVATAR + message.hand, encode_msgpack(message), now_ns)
         poses = [
             (f"{actor}/{side}/{joint}", pose)
             for side, hand in message.hands.items()
@@ -144,6 +154,9 @@ class RecordingWriter:
         return self._writer.register_channel(topic, "json", id)
 
     def _add(self, topic: str, payload: bytes, now_ns: int) -> None:
+        if topic not in self._channels:
+            self._channels[topic] = self._writer.register_channel(topic, "msgpack", 0)
+            self._counts[topic] = 0
         self._writer.add_message(self._channels[topic], now_ns, payload, now_ns, self._counts[topic])
         self._counts[topic] += 1
         if now_ns - self._flushed_ns >= FLUSH_NS:
@@ -186,7 +199,7 @@ def read_about(path: Path | str) -> About:
     meshes, counts = {}, {}
     for record in scan.records():
         if isinstance(record, Metadata) and record.name == ABOUT:
-            metadata = record.metadata
+            metadata |= record.metadata
         elif isinstance(record, Attachment):
             meshes[Path(record.name).name] = record.data
         elif isinstance(record, Message):
@@ -218,13 +231,19 @@ def read_bodies(path: Path | str) -> Iterator[BodyFrame]:
             raise RecordingError(f"{path}: a message of {BODIES} is not a valid body message: {error}") from None
 
 
-def read_hands(path: Path | str) -> Iterator[HandsMessage]:
-    """The hands messages of a recording, in order. Raises `RecordingError`."""
-    for _, _, payload in read_messages(path, HANDS):
+def read_hands(path: Path | str, avatar: str | None = None) -> Iterator[HandsMessage]:
+    """The hands messages of a recording, in order: of the model's hands, or of an avatar's. Raises `RecordingError`."""
+    wanted = HANDS if avatar is None else AVATAR + avatar
+    for topic, _, payload in read_messages(path, wanted):
         try:
             yield decode_msgpack(payload)
         except MessageError as error:
-            raise RecordingError(f"{path}: a message of {HANDS} is not a valid hands message: {error}") from None
+            raise RecordingError(f"{path}: a message of {topic} is not a valid hands message: {error}") from None
+
+
+def recorded_avatars(about: About) -> list[str]:
+    """The names of the avatars whose hands a recording has."""
+    return [topic.removeprefix(AVATAR) for topic in about.counts if topic.startswith(AVATAR)]
 
 
 def recover(path: Path | str, out: Path) -> About:
@@ -236,7 +255,8 @@ def recover(path: Path | str, out: Path) -> About:
     if not about.counts:
         raise RecordingError(f"{path}: no message can be read, so nothing can be recovered")
     with RecordingWriter(out, about.metadata, about.meshes) as writer:
-        for topic, time_ns, payload in read_messages(path, BODIES, HANDS, TF):
+        avatars = (AVATAR + name for name in recorded_avatars(about))
+        for topic, time_ns, payload in read_messages(path, BODIES, HANDS, TF, *avatars):
             writer._add(topic, payload, time_ns)
     return about
 

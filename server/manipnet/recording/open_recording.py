@@ -18,12 +18,15 @@ import msgpack
 
 from manipnet.geometry import Array
 from manipnet.runtime.child_process import ChildProcess
+from manipnet.synthesis.hand.profile import HandProfile, profile_to_json
 from manipnet.telemetry import Telemetry
 
 MAX_WAITING: Final = 7200
 """Messages that wait for a slow disk, two minutes of one actor; beyond it the newest are lost, and counted."""
 EVERY_S: Final = 0.05
 STOP_S: Final = 20.0
+_METADATA: Final = 0
+"""In place of the time of a message: what follows is metadata."""
 
 Meshes = Mapping[str, tuple[Array, Any, float]]
 """Vertices `(V, 3)`, faces `(F, 3)` and scale by the name of the prop."""
@@ -31,12 +34,17 @@ Meshes = Mapping[str, tuple[Array, Any, float]]
 _log = logging.getLogger(__name__)
 
 
+def profile_key(name: str) -> str:
+    """The key of an avatar's profile in the metadata."""
+    return f"hand {name}"
+
+
 class RecordingFailedError(RuntimeError):
     """A recording could not be written; the text says why."""
 
 
 class OpenRecording:
-    """Records hands messages from its construction to `finish`."""
+    """Records hands messages, those of avatars too, from its construction to `finish`."""
 
     def __init__(self, path: Path, metadata: Mapping[str, str], meshes: Meshes, telemetry: Telemetry) -> None:
         self.path = path
@@ -46,6 +54,9 @@ class OpenRecording:
         self._telemetry = telemetry
         self._begin_s = time.monotonic()
         self._waiting: deque[tuple[int, bytes]] = deque()
+        self._profiles: dict[str, HandProfile] = {}
+        """The profiles that the recording has, by name, as far as their avatars have been recorded."""
+        self._metadata = dict(metadata)
         self._finishing = threading.Event()
         self._child = ChildProcess("recorder", _write, path, dict(metadata), dict(meshes))
         self._thread = threading.Thread(target=self._feed, name="recorder", daemon=True)
@@ -63,8 +74,18 @@ class OpenRecording:
         else:
             self._waiting.append((time.time_ns(), payload))
 
+    def note_avatar(self, payload: bytes, profile: HandProfile) -> None:
+        """Take the hands message of an avatar as msgpack, and its profile if that is new; returns at once."""
+        if self._profiles.get(profile.name) is not profile:
+            self._profiles[profile.name] = profile
+            about = {profile_key(profile.name): profile_to_json(profile)}
+            if not about.items() <= self._metadata.items():
+                self._metadata |= about
+                self._waiting.append((_METADATA, msgpack.packb(about) or b""))
+        self.note(payload)
+
     def finish(self) -> dict[str, int]:
-        """Write what waits and close the file; returns the numbers of `hands` and `bodies` in it.
+        """Write what waits and close the file; returns the numbers of `hands`, `bodies` and `avatars` in it.
 
         Raises `RecordingFailedError`.
         """
@@ -105,7 +126,8 @@ class OpenRecording:
         while self._waiting:
             time_ns, payload = self._waiting.popleft()
             self._child.connection.send_bytes(time_ns.to_bytes(8, "little") + payload)
-            self._telemetry.count("recorded", fate="written")
+            if time_ns != _METADATA:
+                self._telemetry.count("recorded", fate="written")
         if is_last:
             self._child.connection.send_bytes(b"")
         return is_last
@@ -116,20 +138,24 @@ def _write(connection: Connection, path: Path, metadata: dict[str, str], meshes:
     from manipnet.recording.mcap_file import RecordingWriter, bodies_of, mesh_file
     from manipnet.wire import decode_msgpack
 
-    counts = {"hands": 0, "bodies": 0}
+    counts = {"hands": 0, "bodies": 0, "avatars": 0}
     answer: dict[str, Any] = counts
     try:
         files = {f"{name}.ply": mesh_file(*mesh) for name, mesh in meshes.items()}
         with RecordingWriter(path, metadata, files) as writer, suppress(EOFError):
             first_actor = None
             while content := connection.recv_bytes():
-                message, time_ns = decode_msgpack(content[8:]), int.from_bytes(content[:8], "little")
+                time_ns = int.from_bytes(content[:8], "little")
+                if time_ns == _METADATA:
+                    writer.add_about(msgpack.unpackb(content[8:]))
+                    continue
+                message = decode_msgpack(content[8:])
                 first_actor = first_actor or message.actor
-                if message.actor == first_actor and message.bodies:
+                if message.actor == first_actor and message.bodies and message.hand is None:
                     writer.write_bodies(bodies_of(message), time_ns)
                     counts["bodies"] += 1
                 writer.write_hands(message, time_ns)
-                counts["hands"] += 1
+                counts["hands" if message.hand is None else "avatars"] += 1
     except Exception as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else f"{type(error).__name__}: {error}"
         answer = {"error": why}

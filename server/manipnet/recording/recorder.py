@@ -14,6 +14,7 @@ from manipnet.common.file_names import is_device, is_encodable
 from manipnet.control.request import Handler, Request, RequestError
 from manipnet.recording.open_recording import OpenRecording, RecordingFailedError
 from manipnet.recording.take_names import NAME, free_path, safe_name, time_name
+from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 
 MIN_FREE_BYTES: Final = 64 << 20
@@ -24,7 +25,7 @@ About = Callable[[], tuple[dict[str, str], Sequence[Prop]]]
 
 
 class Recorder:
-    """Records in `folder`. `note` belongs to the tick thread, everything else to the control thread."""
+    """Records in `folder`. `note` and `note_avatar` belong to the tick thread, the requests to the control thread."""
 
     def __init__(self, folder: Path, about: About, telemetry: Telemetry) -> None:
         self._folder, self._about, self._telemetry = folder, about, telemetry
@@ -38,6 +39,17 @@ class Recorder:
         recording = self.current()
         if recording is not None:
             recording.note(payload)
+
+    def note_avatar(self, payload: bytes, profile: HandProfile) -> None:
+        """Record the hands message of an avatar, given as msgpack, if a recording is in progress; returns at once."""
+        recording = self.current()
+        if recording is not None:
+            recording.note_avatar(payload, profile)
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a recording is in progress. From any thread."""
+        return self.current() is not None
 
     def handlers(self) -> Mapping[str, Handler]:
         """One function per operation."""
@@ -74,20 +86,7 @@ class Recorder:
         return self._stop_recording({})
 
     def _record(self, request: Request) -> dict[str, Any]:
-        name = request.get("name", time_name())
-        if not isinstance(name, str) or not NAME.fullmatch(name):
-            raise RequestError(
-                f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
-                "not beginning or ending with a space or dot"
-            )
-        if is_device(name):
-            raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
-        path = self._folder / (name.removesuffix(".mcap") + ".mcap")
-        if not is_encodable(path):
-            raise RequestError(
-                f"name is {name!r}, which this system cannot write in its encoding ({sys.getfilesystemencoding()}); "
-                "use ASCII letters, or start the server with PYTHONUTF8=1"
-            )
+        path = recording_path(self._folder, request.get("name", time_name()))
         with self._lock:
             if (recording := self.current()) is not None:
                 raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
@@ -139,6 +138,24 @@ class Recorder:
             "recordings": [path.name for path in files],
             "recording": None if recording is None else {"name": recording.path.name, "seconds": recording.seconds},
         }
+
+
+def recording_path(folder: Path, name: Any) -> Path:
+    """The file of a take in `folder`. Raises `RequestError` for a name that is not allowed on some system."""
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise RequestError(
+            f"name is {name!r:.60}; allowed are 1 to 64 letters, digits, spaces, dots, _ and -, "
+            "not beginning or ending with a space or dot"
+        )
+    if is_device(name):
+        raise RequestError(f"name is {name!r}, which stands for a device on Windows; give another name")
+    path = folder / (name.removesuffix(".mcap") + ".mcap")
+    if not is_encodable(path):
+        raise RequestError(
+            f"name is {name!r}, which this system cannot write in its encoding ({sys.getfilesystemencoding()}); "
+            "use ASCII letters, or start the server with PYTHONUTF8=1"
+        )
+    return path
 
 
 def _changed_s(path: Path) -> float:

@@ -35,7 +35,6 @@ class TooManyProfilesError(ValueError):
 @dataclass
 class _Entry:
     avatar: Avatar
-    actor: str
     stays: bool
     """Whether it was given at the start of the server, and is never forgotten."""
     wanted_s: float
@@ -47,23 +46,25 @@ class Avatars:
 
     def __init__(self, telemetry: Telemetry, clock: Callable[[], float] = time.monotonic) -> None:
         self._telemetry, self._clock = telemetry, clock
-        self._entries: dict[str, _Entry] = {}
+        self._entries: dict[tuple[str, str], _Entry] = {}
+        """By the name of the profile and of the actor: one avatar may follow several actors."""
         self.audience: AvatarAudience | None = None
 
     def add(self, avatar: Avatar, actor: str, stays: bool = False) -> None:
         """Let an avatar follow an actor, in place of one of the same name. Raises `TooManyProfilesError`."""
-        name, now_s = avatar.profile.name, self._clock()
-        before = self._entries.get(name)
+        key, now_s = (avatar.profile.name, actor), self._clock()
+        before = self._entries.get(key)
         if before is None and len(self._entries) >= MAX_PROFILES:
             raise TooManyProfilesError(
-                f"the server already has {MAX_PROFILES} hand profiles ({', '.join(self._entries)}); one is forgotten "
-                f"{FORGET_AFTER_S:.0f} s after its last subscriber has left"
+                f"the server already has {MAX_PROFILES} hand profiles, and no more are allowed "
+                f"({', '.join(name for name, _ in self._entries)}); one is forgotten {FORGET_AFTER_S:.0f} s after its "
+                "last subscriber has left"
             )
-        self._entries[name] = _Entry(avatar, actor, stays or (before is not None and before.stays), now_s)
+        self._entries[key] = _Entry(avatar, stays or (before is not None and before.stays), now_s)
 
-    def names(self) -> dict[str, str]:
-        """The actor of each profile by the profile's name."""
-        return {name: entry.actor for name, entry in self._entries.items()}
+    def names(self) -> list[tuple[str, str]]:
+        """The name of each profile, with the name of the actor that its avatar follows."""
+        return list(self._entries)
 
     def profiles(self) -> list[HandProfile]:
         """The profiles of all avatars."""
@@ -71,16 +72,16 @@ class Avatars:
 
     def show(self, actor: Actor, tick: Tick, hands: Mapping[Side, ShownHand], message: HandsMessage) -> None:
         """Publish the hands of the actor's avatars to which somebody has subscribed, for a tick just published."""
-        for name, entry in self._entries.items():
-            if entry.actor == actor.config.name and self._is_wanted(name, entry):
+        for (name, follows), entry in self._entries.items():
+            if follows == actor.config.name and self._is_wanted(name, entry):
                 self._publish(entry.avatar, actor, tick, hands, message)
 
     def forget_unwanted(self) -> None:
         """Forget profiles to which nobody has subscribed for a while."""
         now_s = self._clock()
-        for name, entry in list(self._entries.items()):
-            if not entry.stays and not self._is_wanted(name, entry) and now_s - entry.wanted_s > FORGET_AFTER_S:
-                del self._entries[name]
+        for key, entry in list(self._entries.items()):
+            if not entry.stays and not self._is_wanted(key[0], entry) and now_s - entry.wanted_s > FORGET_AFTER_S:
+                del self._entries[key]
 
     def _is_wanted(self, name: str, entry: _Entry) -> bool:
         wanted = self.audience is not None and self.audience.wants(name)

@@ -83,14 +83,19 @@ class ObjectCatalog:
             loaded = tuple(self._sources)
         return tuple(sorted({*loaded, *self._folder_files(), *library_names()}))
 
-    def shape(self, name: str) -> Shape:
-        """The shape of an object, which is built on first use. Raises `MeshError`."""
+    def source(self, name: str) -> Source | None:
+        """The file of an object, and how it is read; None if there is no such object."""
         with self._lock:
             source = self._sources.get(name)
         if source is None and (file := self._folder_files().get(name)) is not None:
             source = Source(file.resolve(), self._unit)
         if source is None and (file := library_file(name)) is not None:
             source = Source(file)
+        return source
+
+    def shape(self, name: str) -> Shape:
+        """The shape of an object, which is built on first use. Raises `MeshError`."""
+        source = self.source(name)
         if source is None:
             raise MeshError(f"object {name!r} is unknown; allowed are {', '.join(self.names())}")
         return self._built(source)

@@ -143,6 +143,7 @@ def _actor(actor: Actor, now_s: float) -> dict[str, Any]:
             side: {"state": hand.shown.state if hand.shown else "rest", "object": hand.prop}
             for side, hand in actor.hands.items()
         },
+        "objects": {prop.name: prop.object for prop in actor.props},
         "bodies": bodies_report(names, actor.body_keys(), actor.health(now_s)),
         "ticks_skipped": actor.ticks_skipped,
         "sender_restarts": actor.sender_restarts,

@@ -15,8 +15,10 @@ from manipnet.net.errors import ListenError
 from manipnet.outputs import open_outputs
 from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
+from manipnet.page.audience import PageAndClients
 from manipnet.page.supervisor import LivePage
 from manipnet.recording.recorder import Recorder
+from manipnet.recording.take_notes import TakeNotes
 from manipnet.recording.trigger_listener import TriggerListener
 from manipnet.recording.triggered import TriggeredRecordings
 from manipnet.runtime.mesh_watch import MeshWatch
@@ -51,7 +53,8 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     opened.callback(recorder.stop)
     triggers = TriggeredRecordings(recorder, telemetry)
     opened.callback(triggers.close)
-    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers()}, telemetry)
+    takes = TakeNotes(config.takes, recorder)
+    dispatcher = Dispatcher({**session.handlers(), **recorder.handlers(), **takes.handlers()}, telemetry)
     opened.callback(dispatcher.close)
 
     def submit(request: bytes, reply: Callable[[bytes], object]) -> None:
@@ -59,9 +62,8 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
 
     emission = Emission(telemetry, session.bundle.hand, config.host, keys, session.given_avatars, submit)
     outputs = open_outputs(config.of, emission)
-    publisher = Publisher(outputs, telemetry, recorder.note)
+    publisher = Publisher(outputs, telemetry, recorder, session.given_avatars.values())
     opened.callback(publisher.close)
-    session.avatars.audience = publisher
     meshes = MeshWatch(session.catalog, session.replace_shape)
     opened.callback(meshes.stop)
     meshes.start()
@@ -71,6 +73,7 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
     page_host = LOOPBACK if keys is not None else config.host  # browsers have no keys
     page = LivePage(page_host, config.page_port, dispatcher.submit, telemetry, session.bundle.folder / HAND_FILE)
     opened.callback(page.stop)
+    session.avatars.audience = PageAndClients(publisher, page)
     page.start()
     receivers = make_receivers(
         config.of, session.senders, telemetry, config.host, keys, config.allow, config.body_keys, triggers

@@ -18,9 +18,11 @@ from manipnet.control.calibration_requests import CalibrationRequests
 from manipnet.control.hand_requests import HandRequests
 from manipnet.control.peers import Peers
 from manipnet.control.request import Handler, Request
+from manipnet.control.rig_requests import RigRequests
 from manipnet.control.session_requests import SessionRequests
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.jit import collection_paused
+from manipnet.recording.open_recording import profile_key
 from manipnet.recording.recorder import carried_objects
 from manipnet.runtime.avatars import avatars_of
 from manipnet.runtime.flight_recorder import FlightRecorder
@@ -98,15 +100,17 @@ class Session:
         ).handlers()
         hands = HandRequests(self._proxy, self.avatars, self.bundle.hand).handlers()
         calibration = CalibrationRequests(self._proxy, self.config.rig).handlers()
+        rig = RigRequests(self._proxy, self.catalog, self.config.rig).handlers()
         own_hello, own_status = requests["hello"], requests["status"]
 
         def hello(request: Request) -> dict[str, Any]:
             return {**own_hello(request), "addresses": dict(self.addresses)}
 
         def status(request: Request) -> dict[str, Any]:
-            return {**own_status(request), "exposed": self.config.is_exposed}
+            profiles = self._proxy.ask(self.avatars.names)
+            return {**own_status(request), "exposed": self.config.is_exposed, "hand_profiles": profiles}
 
-        return {**requests, "hello": hello, **hands, **calibration, **self.peers.handlers(status)}
+        return {**requests, "hello": hello, **hands, **calibration, **rig, **self.peers.handlers(status)}
 
     def replace_shape(self, old: Shape, new: Shape) -> None:
         """Replace a shape in every prop between two ticks. From any thread; raises `RequestError`."""
@@ -122,7 +126,7 @@ class Session:
             "model": self.bundle.name,
             "model_hash": self.bundle.model_hash,
             "objects": carried_objects(props),
-            **{f"hand {profile.name}": profile_to_json(profile) for profile in profiles},
+            **{profile_key(profile.name): profile_to_json(profile) for profile in profiles},
         }
         if self.config.rig is not None:
             with suppress(OSError, UnicodeDecodeError):  # a rig file that is gone must not prevent a recording

@@ -34,12 +34,14 @@ from manipnet.wire.hands import (
 from manipnet.wire.validation import check, require_version
 
 
-def encode_binary(message: HandsMessage) -> bytes:
+def encode_binary(message: HandsMessage, checked: bool = False) -> bytes:
     """Encode a message as the records of `docs/protocol.md`. Names are cut to `NAME_BYTES`, between two characters.
 
-    Raises `MessageError` for a message that breaks a rule, for example with a number that is not finite.
+    `checked` means that `check` has just accepted the same message. Raises `MessageError` for a message that breaks a
+    rule, for example with a number that is not finite.
     """
-    check(message)
+    if not checked:
+        check(message)
     timed = message.timecode is not None
     hands = [_hand_record(side, hand) for side, hand in message.hands.items()]
     bodies = [_BODY.pack(body.tracked, *body.pose.tolist(), _name(body.name)) for body in message.bodies]

@@ -15,7 +15,7 @@ from manipnet.wire.validation import check, known_side, require_version
 def encode_msgpack(message: HandsMessage, checked: bool = False) -> bytes:
     """Encode a message as the map of `docs/protocol.md`.
 
-    `checked` means that another encoder has just checked the same message. Raises `MessageError` for a message that
+    `checked` means that `check` has just accepted the same message. Raises `MessageError` for a message that
     breaks a rule, for example with a number that is not finite.
     """
     if not checked:

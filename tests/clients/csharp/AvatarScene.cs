@@ -24,12 +24,15 @@ static class AvatarScene
         receiver.ControlAddress = control;
         receiver.SolveOnAvatar = true;
         var fingers = new List<ManipNetHand>();
+        var output = Console.Out;
+        Console.SetOut(Console.Error); // for warnings about missing bones
         foreach (Side side in new[] { Side.Left, Side.Right })
         {
             var hand = bones[0].gameObject.AddComponent<ManipNetHand>();
             hand.Configure(receiver, side, null, bones[0], WristMode.Arm);
             fingers.Add(hand);
         }
+        Console.SetOut(output);
         Glue.Call(receiver, "OnEnable");
         while (Console.ReadLine() != null)
         {

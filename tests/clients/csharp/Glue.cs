@@ -22,6 +22,7 @@ static class Glue
     static int Main(string[] args)
     {
         Thread.CurrentThread.CurrentCulture = CultureInfo.InvariantCulture;
+        if (args.Length > 2) return Actors(args[0], args.Skip(2).ToArray());
         if (args.Length > 1) return AvatarScene.Run(args[0], args[1]);
         var tests = new ManipNet.Client.Tests.DecoderTests();
         tests.RefusesOtherData();
@@ -73,6 +74,40 @@ static class Glue
         Window(args[0]);
         Call(receiver, "OnDisable");
         Console.WriteLine("state " + receiver.Stats.State);
+        return 0;
+    }
+
+    /// <summary>
+    /// Shows actors with one receiver: prints for each which hands it has, and where its right wrist and the joint of a component
+    /// are.
+    /// </summary>
+    static int Actors(string address, string[] names)
+    {
+        var receiver = new GameObject("receiver").AddComponent<ManipNetReceiver>();
+        receiver.Address = address;
+        Call(receiver, "OnEnable");
+        var joints = names.Select(name => new GameObject(name).AddComponent<ManipNetJoints>()).ToArray();
+        for (int k = 0; k < names.Length; k++)
+        {
+            joints[k].Configure(receiver, Side.Right, null);
+            joints[k].Actor = names[k];
+            Call(joints[k], "Start");
+        }
+        for (int i = 0; i < 1000 && !names.All(name => receiver.Of(name).HasHands && receiver.Of(name).Weight == 1f); i++)
+        {
+            Thread.Sleep(10);
+            Call(receiver, "LateUpdate");
+        }
+        foreach (ManipNetJoints hand in joints) Call(hand, "LateUpdate");
+        for (int k = 0; k < names.Length; k++)
+        {
+            HandsFrame hands = receiver.Of(names[k]).Hands;
+            Console.WriteLine(hands.Actor.Text + " " + hands.Left.Present + " " + hands.Right.Present);
+            Print("wrist", Flat(joints[k].transform.All().First(t => t.name == "Wrist")));
+            Vector3 place = ManipNetPose.Position(hands.Right.Joints, 7);
+            Print("place", new[] { place.x, place.y, place.z });
+        }
+        Call(receiver, "OnDisable");
         return 0;
     }
 

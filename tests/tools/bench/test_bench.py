@@ -2,6 +2,7 @@
 
 import json
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from manipnet.wire.bodies import BodyFrame
 from manipnet_tools import cli
 from manipnet_tools.bench.harness import STAGES, TICK, TURN, TickRunner, race
 from manipnet_tools.bench.intake import BONES, CHUNK, Case, cases, frame_of, time_cases
+from manipnet_tools.bench.quick import Quick, verdict
 from manipnet_tools.bench.report import verdicts, with_ratios
 from manipnet_tools.bench.scenarios import demo, endless
 from manipnet_tools.bench.shapes import gourd
@@ -74,6 +76,30 @@ def test_the_command_measures_and_writes_the_figures(
     printed = capsys.readouterr().out
     assert "published interval: p99" in printed
     assert figures["machine"]["processor"] in printed
+
+
+def test_a_plain_installation_gets_a_verdict_in_a_sentence(
+    tiny_bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for missing in ("onnx", "torch"):
+        monkeypatch.setitem(sys.modules, missing, None)
+    file = tmp_path / "quick.json"
+    assert cli.main(["bench", "--model", str(tiny_bundle), "--seconds", "1", "--json", str(file)]) == 0
+    *_, verdict, hint = capsys.readouterr().out.splitlines()
+    assert verdict.startswith(("Yes, this computer", "Only just", "No, this computer"))
+    assert "--full" in hint
+    figures = json.loads(file.read_text(encoding="utf-8"))["quick"]
+    assert figures["tick_p99_ms"] >= figures["tick_p50_ms"] > 0.0
+    assert figures["verdict"] == verdict
+    assert cli.main(["bench", "--model", str(tiny_bundle), "--full"]) == 1
+    assert "onnx is not installed: python -m pip install 'manipnet-live[train]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("tick_ms", "late_ms", "begin"), [(1.0, 0.3, "Yes"), (7.0, 4.0, "Only just"), (14.0, 5.0, "No")]
+)
+def test_the_verdict_follows_from_the_time_that_is_left(tick_ms: float, late_ms: float, begin: str) -> None:
+    assert verdict(Quick(tick_ms, tick_ms, late_ms, 2.5 * tick_ms, 1.0)).startswith(begin)
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)

@@ -48,8 +48,14 @@ def test_the_answer_is_printed_with_its_quality() -> None:
 @pytest.mark.parametrize(
     ("server", "complaint"),
     [
-        ("127.0.0.1:1", "no server answers at tcp://127.0.0.1:1 .* start it with"),
-        ("tcp://127.0.0.1:1", "no server answers at tcp://127.0.0.1:1 .* start it with"),
+        (
+            "127.0.0.1:1",
+            "no server answers at tcp://127.0.0.1:1 .* (start one with manipnet-serve|name one with --server)",
+        ),
+        (
+            "tcp://127.0.0.1:1",
+            "no server answers at tcp://127.0.0.1:1 .* (start one with manipnet-serve|name one with --server)",
+        ),
         ("127.0.0.1:many", "a port of 1 … 65535"),
     ],
 )

@@ -56,8 +56,9 @@ def run(options: BatchOptions) -> None:
         summary = {"model": options.model, "look_ahead_s": options.look_ahead, "takes": [asdict(o) for o in outcomes]}
         with replacing(options.out / SUMMARY) as file:
             file.write(json.dumps(summary, indent=2).encode())
-        console.print(table(outcomes))
-        if len(outcomes) < len(jobs):
+        if outcomes:
+            console.print(table(outcomes), soft_wrap=False)
+        if outcomes and len(outcomes) < len(jobs):
             console.print(f"{len(jobs) - len(outcomes)} takes are left; run the same command again to continue")
     if failed := sum(outcome.state == "failed" for outcome in outcomes):
         raise BatchError(
@@ -137,17 +138,26 @@ def _outcomes(
 
 
 def table(outcomes: Sequence[Outcome]) -> Table:
-    """One line per take."""
-    lines = Table("take", "result", "length", "time taken", "times real time", "reason")
+    """One line per take. The reason of a failure stands beside the take, and is broken rather than cut."""
+    lines = Table()
+    lines.add_column("take", overflow="fold")
+    lines.add_column("result", no_wrap=True)
+    if any(outcome.reason for outcome in outcomes):
+        lines.add_column("reason", overflow="fold")
+    for title in ("length", "took", "speed"):
+        lines.add_column(title, justify="right", no_wrap=True)
     for outcome in outcomes:
         length_s = outcome.frames / TICK_HZ
+        state = Text("up to date" if outcome.state == "skipped" else outcome.state, COLOURS[outcome.state])
+        reason = [outcome.reason] if len(lines.columns) == 6 else []
+        is_done = outcome.state == "done"
         lines.add_row(
             outcome.name,
-            Text("up to date" if outcome.state == "skipped" else outcome.state, COLOURS[outcome.state]),
+            state,
+            *reason,
             f"{length_s:.1f} s" if outcome.frames else "",
-            f"{outcome.seconds:.1f} s" if outcome.state == "done" else "",
-            f"{length_s / outcome.seconds:.1f}" if outcome.state == "done" else "",
-            outcome.reason,
+            f"{outcome.seconds:.1f} s" if is_done else "",
+            f"{length_s / outcome.seconds:.1f}x" if is_done else "",
         )
     return lines
 

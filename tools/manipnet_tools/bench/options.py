@@ -16,13 +16,21 @@ Section = Literal[
 ]
 SECTIONS: Final[tuple[Section, ...]] = get_args(Section)
 USUAL: Final[tuple[Section, ...]] = tuple(name for name in SECTIONS if name != "minutes")
-"""The sections that are measured by default."""
+"""The sections of `--full`."""
+QUICK_S: Final = 12.0
+FULL_S: Final = 100.0
 
 
 @dataclass(frozen=True)
 class BenchOptions(WritingOptions):
-    """Measure how long each stage of a tick takes, beside a reference that is measured in the same run."""
+    """Measure whether this computer is fast enough.
 
+    With --full or --only: how long each stage of a tick takes, beside a reference that is measured in the same run,
+    which needs the extra train.
+    """
+
+    full: bool = False
+    """Measure all sections but `minutes`, which takes ten minutes."""
     take: Annotated[Path | None, arg(metavar="TAKE", help_behavior_hint="")] = None
     """Measure on this take instead of the bundled demo."""
     mesh: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME=FILE")] = ()
@@ -35,10 +43,15 @@ class BenchOptions(WritingOptions):
     """What the models run on."""
     json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="")] = None
     """Also write all figures to this file."""
-    seconds: Annotated[float, arg(metavar="SECONDS")] = 100.0
-    """Total time of the timed parts. Building models and starting servers takes more."""
+    seconds: Annotated[float | None, arg(metavar="SECONDS", help_behavior_hint="")] = None
+    """Total time of the timed parts, 12 s or with --full 100 s. Building models and starting servers takes more."""
     only: UseAppendAction[tuple[Section, ...]] = ()
-    """Measure only this section. By default all but `minutes`, which takes ten minutes."""
+    """Measure only this section; repeatable."""
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether only the verdict is wanted."""
+        return not (self.full or self.only or self.beside)
 
     def check(self) -> None:
         """Raise `ConfigError` or `BundleError` for values that cannot be used."""
@@ -50,3 +63,5 @@ class BenchOptions(WritingOptions):
         for model in (self.model, *self.beside):
             find_bundle(model)
         require_new(self.json, self.force, "--json")
+        if self.seconds is not None and self.seconds <= 0.0:
+            raise ConfigError(f"--seconds is {self.seconds:g}; it must be more than 0")

@@ -79,13 +79,12 @@ def _import(options: argparse.Namespace) -> None:
 
 
 def _show(options: argparse.Namespace) -> None:
-    require_file(options.hand)
+    require_hand(options.hand)
     require_new(options.out, options.force)
     _draw(options.hand, options.out)
 
 
 def _draw(hand: Path, out: Path) -> None:
-    require_hand(hand)
     from manipnet.synthesis.hand.profile import read_profile
     from manipnet.synthesis.model.bundle import load_bundle
     from manipnet_tools.hands.drawing import draw_profile

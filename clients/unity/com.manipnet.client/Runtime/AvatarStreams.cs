@@ -30,6 +30,11 @@ namespace ManipNet.Client.Unity
             _hands.Remove(hand);
         }
 
+        public void Update()
+        {
+            foreach (Stream stream in _streams) stream.View.Update();
+        }
+
         public IEnumerable<HandsView> Views
         {
             get
@@ -43,7 +48,7 @@ namespace ManipNet.Client.Unity
         {
             HandProfile left = ProfileOf(hand, actor, Side.Left), right = ProfileOf(hand, actor, Side.Right);
             if (left == null && right == null) return null;
-            Stream stream = _streams.Find(known => known.Rig == hand.Rig && known.Actor == actor);
+            Stream stream = Begun(hand.Rig, actor);
             if (stream != null && stream.Left == left && stream.Right == right) return stream.View;
             if (stream != null)
             {
@@ -55,6 +60,13 @@ namespace ManipNet.Client.Unity
             stream = new Stream { Rig = hand.Rig, Actor = actor, Left = left, Right = right, View = new HandsView(name, client) };
             _streams.Add(stream);
             return stream.View;
+        }
+
+        Stream Begun(Transform rig, string actor)
+        {
+            foreach (Stream stream in _streams)
+                if (stream.Rig == rig && stream.Actor == actor) return stream;
+            return null;
         }
 
         HandProfile ProfileOf(ManipNetHand like, string actor, Side side)

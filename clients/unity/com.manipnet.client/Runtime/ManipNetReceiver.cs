@@ -34,7 +34,8 @@ namespace ManipNet.Client.Unity
         readonly Dictionary<string, HandsView> _views = new Dictionary<string, HandsView>();
         readonly AvatarStreams _avatars = new AvatarStreams();
         readonly HandsFrame _nothing = new HandsFrame();
-        string _connectedTo;
+        string _address, _webAddress, _actor, _controlAddress;
+        bool _isOn, _solveOnAvatar;
 
         /// <summary>
         /// The pose to show in this frame, in the project's axes (right-handed); ManipNetPose converts it.
@@ -125,7 +126,7 @@ namespace ManipNet.Client.Unity
         /// <summary>The hands of an actor; an empty name means the receiver's own. Null while the receiver is off.</summary>
         public HandsView Of(string who)
         {
-            if (_connectedTo == null) return null;
+            if (!_isOn) return null;
             string name = string.IsNullOrEmpty(who) ? actor : who;
             HandsView view;
             if (!_views.TryGetValue(name, out view))
@@ -143,7 +144,7 @@ namespace ManipNet.Client.Unity
 #if UNITY_WEBGL && !UNITY_EDITOR
             return null; // a browser has no way to the control port
 #else
-            if (!solveOnAvatar || _connectedTo == null || Of(hand.Actor) == null) return null;
+            if (!solveOnAvatar || !_isOn || Of(hand.Actor) == null) return null;
             return _avatars.Of(hand, address, controlAddress, string.IsNullOrEmpty(hand.Actor) ? actor : hand.Actor, delay);
 #endif
         }
@@ -158,15 +159,24 @@ namespace ManipNet.Client.Unity
             _avatars.Leave(hand);
         }
 
-        /// <summary>What the clients were made for; they are made anew when that changes, as in the Inspector.</summary>
-        string Wanted
+        /// <summary>Whether the clients were made for other settings, as after a change in the Inspector.</summary>
+        bool Changed
         {
-            get { return address + "\n" + webAddress + "\n" + actor + "\n" + controlAddress + "\n" + solveOnAvatar; }
+            get
+            {
+                return _address != address || _webAddress != webAddress || _actor != actor || _controlAddress != controlAddress
+                    || _solveOnAvatar != solveOnAvatar;
+            }
         }
 
         void OnEnable()
         {
-            _connectedTo = Wanted;
+            _isOn = true;
+            _address = address;
+            _webAddress = webAddress;
+            _actor = actor;
+            _controlAddress = controlAddress;
+            _solveOnAvatar = solveOnAvatar;
             Of("");
         }
 
@@ -194,7 +204,7 @@ namespace ManipNet.Client.Unity
             foreach (HandsView view in Views) view.Dispose();
             _views.Clear();
             _avatars.Clear();
-            _connectedTo = null;
+            _isOn = false;
         }
 
         void OnValidate()
@@ -204,12 +214,14 @@ namespace ManipNet.Client.Unity
 
         void LateUpdate()
         {
-            if (_connectedTo != Wanted)
+            if (Changed)
             {
                 OnDisable();
                 OnEnable();
             }
-            foreach (HandsView view in Views) view.Update();
+            foreach (HandsView view in _views.Values)
+                if (view != null) view.Update();
+            _avatars.Update();
         }
     }
 }

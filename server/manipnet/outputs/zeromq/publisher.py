@@ -36,13 +36,18 @@ class ZmqPublisher(HandsOutput):
         """When the socket, which has failed, is opened again."""
 
     def send(self, hands: EncodedHands) -> bool:
-        """Publish one message under both topics; False while the socket has failed and is not open again yet."""
+        """Publish one message under the topics that have subscribers.
+
+        False while the socket has failed and is not open again yet.
+        """
         if self._retry_s is not None and not self._reopened():
             return False
         self._read_subscriptions()
         try:
-            self._bound.socket.send(TOPIC_MSGPACK + hands.msgpack)
-            self._bound.socket.send(TOPIC_BIN + hands.binary)
+            if self._is_subscribed(TOPIC_MSGPACK):
+                self._bound.socket.send(TOPIC_MSGPACK + hands.msgpack)
+            if self._is_subscribed(TOPIC_BIN):
+                self._bound.socket.send(TOPIC_BIN + hands.binary)
         except zmq.ZMQError as error:
             self._bound.close()
             self._fail(error)
@@ -70,6 +75,8 @@ class ZmqPublisher(HandsOutput):
         return False
 
     def _is_subscribed(self, topic: bytes) -> bool:
+        if len(self._subscribed) >= MAX_SUBSCRIPTIONS and topic in (TOPIC_MSGPACK, TOPIC_BIN):
+            return True  # the subscription may be one of those that were not remembered
         return any(topic.startswith(prefix) for prefix in self._subscribed)
 
     def _read_subscriptions(self) -> None:
@@ -78,6 +85,10 @@ class ZmqPublisher(HandsOutput):
             return
         try:
             for _ in range(READ_AT_ONCE):
+                if (
+                    not int(self._bound.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN
+                ):  # an exception would cost ten times more
+                    return
                 message = self._bound.socket.recv(zmq.NOBLOCK)
                 if message[:1] == b"\x01" and len(self._subscribed) < MAX_SUBSCRIPTIONS:
                     self._subscribed.add(message[1:])

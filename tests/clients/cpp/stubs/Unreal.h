@@ -1,13 +1,16 @@
 // The types of the engine that the plugin uses, complete enough to run it without Unreal.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <map>
 #include <memory>
 #include <set>
+#include <mutex>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -22,6 +25,7 @@ using uint8 = std::uint8_t;
 #define UCLASS(...)
 #define UENUM(...)
 #define UPROPERTY(...)
+#define UFUNCTION(...)
 #define INDEX_NONE (-1)
 #define DEFINE_LOG_CATEGORY_STATIC(category, verbosity, limit)
 #define UE_LOG(category, verbosity, format, ...) LogLine(FString::Printf(format __VA_OPT__(, ) __VA_ARGS__))
@@ -60,9 +64,10 @@ struct FString {
         if constexpr (sizeof...(args) == 0) {
             return FString(format);
         } else {
-            char text[512];
-            std::snprintf(text, sizeof text, format, args...);
-            return FString(text);
+            const int length = std::snprintf(nullptr, 0, format, args...);
+            std::vector<char> text(static_cast<std::size_t>(length) + 1);
+            std::snprintf(text.data(), text.size(), format, args...);
+            return FString(text.data());
         }
     }
 };
@@ -200,6 +205,83 @@ T* Cast(UObject* object) {
 }
 struct FDefaultModuleImpl {};
 
+// Assets by their paths
+struct FSoftObjectPath {
+    FString Path;
+    explicit FSoftObjectPath(const FString& path) : Path(path) {}
+};
+template <typename T>
+struct TSoftObjectPtr {
+    FString Path;
+    TSoftObjectPtr() = default;
+    explicit TSoftObjectPtr(const FSoftObjectPath& path) : Path(path.Path) {}
+    FString ToString() const { return Path; }
+};
+inline std::map<std::string, UObject*>& Assets() {
+    static std::map<std::string, UObject*> assets;
+    return assets;
+}
+template <typename T>
+T* LoadObject(UObject*, const TCHAR* name) {
+    const auto found = Assets().find(name);
+    return found == Assets().end() ? nullptr : dynamic_cast<T*>(found->second);
+}
+template <typename T>
+T* NewObject() {
+    return new T();
+}
+
+// Tasks: those for the game thread wait until RunGameThread.
+enum class EAsyncExecution { TaskGraph, Thread };
+namespace ENamedThreads {
+enum Type { GameThread };
+}
+struct GameThreadTasks {
+    std::mutex Lock;
+    std::vector<std::function<void()>> Waiting;
+};
+inline GameThreadTasks& Tasks() {
+    static GameThreadTasks tasks;
+    return tasks;
+}
+template <typename F>
+void Async(EAsyncExecution, F task) {
+    std::thread(task).detach();
+}
+template <typename F>
+void AsyncTask(ENamedThreads::Type, F task) {
+    const std::lock_guard<std::mutex> guard(Tasks().Lock);
+    Tasks().Waiting.push_back(task);
+}
+inline void RunGameThread() {
+    std::vector<std::function<void()>> tasks;
+    {
+        const std::lock_guard<std::mutex> guard(Tasks().Lock);
+        tasks.swap(Tasks().Waiting);
+    }
+    for (const auto& task : tasks) task();
+}
+
+// Blueprints
+template <typename T>
+struct TWeakObjectPtr {
+    T* Object;
+    explicit TWeakObjectPtr(T* object) : Object(object) {}
+    T* Get() const { return Object; }
+};
+#define DECLARE_DYNAMIC_MULTICAST_DELEGATE_OneParam(name, type, parameter) \
+    struct name {                                                        \
+        std::vector<std::function<void(type)>> Bound;                    \
+        void Broadcast(type parameter) const {                           \
+            for (const auto& call : Bound) call(parameter);              \
+        }                                                                \
+    }
+struct UBlueprintAsyncActionBase : UObject {
+    bool Ready = false;
+    virtual void Activate() {}
+    virtual void SetReadyToDestroy() { Ready = true; }
+};
+
 // Live Link
 struct FLiveLinkBase {
     virtual ~FLiveLinkBase() = default;
@@ -314,6 +396,11 @@ struct FReferenceSkeleton {
     FName GetBoneName(const int32 index) const { return Bones[index].Name; }
     int32 GetParentIndex(const int32 index) const { return Bones[index].ParentIndex; }
     const TArray<FTransform>& GetRefBonePose() const { return Pose; }
+};
+class USkeletalMesh : public UObject {
+public:
+    FReferenceSkeleton RefSkeleton;
+    const FReferenceSkeleton& GetRefSkeleton() const { return RefSkeleton; }
 };
 struct FCompactPoseBoneIndex {
     int32 BoneIndex;

@@ -1,11 +1,14 @@
 #include "ManipNetLiveLinkSource.h"
 
+#include "Core/AvatarClient.h"
 #include "Core/LocalClock.h"
 #include "Core/Timecode.h"
+#include "Engine/SkeletalMesh.h"
 #include "HAL/PlatformTime.h"
 #include "ILiveLinkClient.h"
 #include "ManipNetLiveLinkSourceSettings.h"
 #include "ManipNetSettings.h"
+#include "ManipNetSkeletons.h"
 #include "Misc/FrameRate.h"
 #include "Misc/QualifiedFrameTime.h"
 #include "Misc/Timecode.h"
@@ -26,7 +29,7 @@ FTransform ToTransform(const manipnet::UnrealPose& Pose)
     return FTransform(FQuat(Pose.QX, Pose.QY, Pose.QZ, Pose.QW), FVector(Pose.X, Pose.Y, Pose.Z));
 }
 
-FLiveLinkStaticDataStruct DescribeHand()
+FLiveLinkStaticDataStruct DescribeHand(bool bAvatar)
 {
     FLiveLinkStaticDataStruct Static(FLiveLinkSkeletonStaticData::StaticStruct());
     FLiveLinkSkeletonStaticData& Skeleton = *Static.Cast<FLiveLinkSkeletonStaticData>();
@@ -39,7 +42,11 @@ FLiveLinkStaticDataStruct DescribeHand()
     }
     Skeleton.SetBoneNames(Names);
     Skeleton.SetBoneParents(Parents);
-    Skeleton.PropertyNames.Add(FName(TEXT("ManipNetWeight")));
+    Skeleton.PropertyNames.Add(FName(ManipNetSkeletons::WeightProperty));
+    if (bAvatar)
+    {
+        Skeleton.PropertyNames.Add(FName(ManipNetSkeletons::AvatarProperty));
+    }
     return Static;
 }
 
@@ -56,9 +63,17 @@ void SetTimes(FLiveLinkBaseFrameData& Data, const manipnet::HandsFrame& Frame, d
     }
 }
 
-FName SubjectName(const manipnet::HandsFrame& Frame, const FString& Part)
+/// The name of the avatar's mesh, the last part of its path; empty for no avatar.
+std::string NameOfAvatar(const manipnet::Connection& To)
 {
-    return FName(*FString::Printf(TEXT("ManipNet_%s_%s"), UTF8_TO_TCHAR(Frame.Actor.Text), *Part));
+    return To.Avatar.substr(To.Avatar.find_last_of("./") + 1);
+}
+
+FName SubjectName(const manipnet::HandsFrame& Frame, const manipnet::Connection& To, const std::string& Part)
+{
+    const std::string Avatar = NameOfAvatar(To);
+    const std::string Name = "ManipNet_" + std::string(Frame.Actor.Text) + (Avatar.empty() ? "_" : "_" + Avatar + "_") + Part;
+    return FName(UTF8_TO_TCHAR(Name.c_str()));
 }
 }
 
@@ -127,9 +142,37 @@ void FManipNetLiveLinkSource::Start()
     }
     if (Error.empty() && LiveLink)
     {
-        Client = std::make_unique<manipnet::Client>(
-            CurrentConnection(), [this](const manipnet::HandsFrame& Frame) { PushRaw(Frame); });
+        const manipnet::Connection To = CurrentConnection();
+        Client = !To.Avatar.empty() ? StartAvatar(To) : std::make_unique<manipnet::Client>(
+            To, [this](const manipnet::HandsFrame& Frame) { PushRaw(Frame); });
     }
+}
+
+/// Makes the hand profile of the avatar, and a client that uploads it. Returns null, and sets the error, if that fails.
+std::unique_ptr<manipnet::Client> FManipNetLiveLinkSource::StartAvatar(const manipnet::Connection& To)
+{
+    const USkeletalMesh* Mesh = LoadObject<USkeletalMesh>(nullptr, UTF8_TO_TCHAR(To.Avatar.c_str()));
+    manipnet::BoneMap Map;
+    Error = Mesh ? manipnet::ParseBoneMap(To.AvatarBones, Map) : "the avatar " + To.Avatar + " cannot be loaded; choose a skeletal mesh of this project";
+    if (!Error.empty())
+    {
+        return nullptr;
+    }
+    const manipnet::RestSkeleton Rest = ManipNetSkeletons::ToRest(Mesh->GetRefSkeleton());
+    manipnet::HandProfile Left, Right;
+    manipnet::CharacterHand Hand;
+    const std::string LeftProblem = Hand.Profile(Rest, manipnet::Side::Left, Map, Left);
+    const std::string RightProblem = Hand.Profile(Rest, manipnet::Side::Right, Map, Right);
+    if (!LeftProblem.empty() && !RightProblem.empty())
+    {
+        Error = "the avatar has no hands: " + LeftProblem + "; " + RightProblem;
+        return nullptr;
+    }
+    const manipnet::HandProfile* LeftHand = LeftProblem.empty() ? &Left : nullptr;
+    const manipnet::HandProfile* RightHand = RightProblem.empty() ? &Right : nullptr;
+    const std::string Name = manipnet::ProfileName(NameOfAvatar(To), To.Actor, LeftHand, RightHand);
+    return std::make_unique<manipnet::AvatarClient>(To, Name, manipnet::ProfileJson(Name, LeftHand, RightHand),
+        [this](const manipnet::HandsFrame& Frame) { PushRaw(Frame); });
 }
 
 void FManipNetLiveLinkSource::Retire()
@@ -230,21 +273,26 @@ void FManipNetLiveLinkSource::PushHand(const manipnet::HandsFrame& Frame, manipn
     {
         return;
     }
-    const FName Name = SubjectName(Frame, Side == manipnet::Side::Left ? TEXT("left") : TEXT("right"));
+    const manipnet::Connection To = CurrentConnection();
+    const FName Name = SubjectName(Frame, To, Side == manipnet::Side::Left ? "left" : "right");
     const FLiveLinkSubjectKey Key(SourceGuid, Name);
     if (MustDescribe(Name))
     {
-        LiveLink->PushSubjectStaticData_AnyThread(Key, ULiveLinkAnimationRole::StaticClass(), DescribeHand());
+        LiveLink->PushSubjectStaticData_AnyThread(Key, ULiveLinkAnimationRole::StaticClass(), DescribeHand(!To.Avatar.empty()));
     }
     FLiveLinkFrameDataStruct Data(FLiveLinkAnimationFrameData::StaticStruct());
     FLiveLinkAnimationFrameData& Animation = *Data.Cast<FLiveLinkAnimationFrameData>();
     manipnet::Skeleton::Poses Poses;
-    manipnet::Skeleton::LocalPoses(Hand, CurrentConnection().Place, Poses);
+    manipnet::Skeleton::LocalPoses(Hand, To.Place, Poses);
     for (const manipnet::UnrealPose& Pose : Poses)
     {
         Animation.Transforms.Add(ToTransform(Pose));
     }
     Animation.PropertyValues.Add(Weight);
+    if (!To.Avatar.empty())
+    {
+        Animation.PropertyValues.Add(1.0f);
+    }
     SetTimes(Animation, Frame, Time);
     LiveLink->PushSubjectFrameData_AnyThread(Key, MoveTemp(Data));
 }
@@ -255,7 +303,8 @@ void FManipNetLiveLinkSource::PushBody(const manipnet::HandsFrame& Frame, const 
     {
         return;
     }
-    const FName Name = SubjectName(Frame, UTF8_TO_TCHAR(Body.BodyName.Text));
+    const manipnet::Connection To = CurrentConnection();
+    const FName Name = SubjectName(Frame, To, Body.BodyName.Text);
     const FLiveLinkSubjectKey Key(SourceGuid, Name);
     if (MustDescribe(Name))
     {
@@ -264,7 +313,7 @@ void FManipNetLiveLinkSource::PushBody(const manipnet::HandsFrame& Frame, const 
     }
     FLiveLinkFrameDataStruct Data(FLiveLinkTransformFrameData::StaticStruct());
     FLiveLinkTransformFrameData& Pose = *Data.Cast<FLiveLinkTransformFrameData>();
-    Pose.Transform = ToTransform(CurrentConnection().Place.Place(manipnet::ToUnreal(Body.Pose.data())));
+    Pose.Transform = ToTransform(To.Place.Place(manipnet::ToUnreal(Body.Pose.data())));
     SetTimes(Pose, Frame, Time);
     LiveLink->PushSubjectFrameData_AnyThread(Key, MoveTemp(Data));
 }

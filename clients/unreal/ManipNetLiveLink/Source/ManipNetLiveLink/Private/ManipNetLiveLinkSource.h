@@ -32,6 +32,7 @@ public:
 
 private:
     void Start();
+    std::unique_ptr<manipnet::Client> StartAvatar(const manipnet::Connection& To);
     void Retire();
     void ForgetRemovedSubjects();
     void PushRaw(const manipnet::HandsFrame& Frame);

@@ -3,49 +3,16 @@
 #include "BoneContainer.h"
 #include "BonePose.h"
 #include "Core/SubjectHand.h"
+#include "ManipNetSkeletons.h"
 #include "ReferenceSkeleton.h"
 #include "Roles/LiveLinkAnimationTypes.h"
 
 DEFINE_LOG_CATEGORY_STATIC(LogManipNet, Log, All);
 
+using namespace ManipNetSkeletons;
+
 namespace
 {
-const FName WeightName(TEXT("ManipNetWeight"));
-
-std::string ToText(const FName& Name)
-{
-    return std::string(TCHAR_TO_UTF8(*Name.ToString()));
-}
-
-manipnet::LocalBone ToLocal(const FTransform& Transform)
-{
-    const FQuat Q = Transform.GetRotation();
-    const FVector T = Transform.GetTranslation();
-    return {{Q.X, Q.Y, Q.Z, Q.W}, {T.X, T.Y, T.Z}, Transform.GetScale3D().X};
-}
-
-std::vector<manipnet::LocalBone> ToLocal(const TArray<FTransform>& Transforms)
-{
-    std::vector<manipnet::LocalBone> Local;
-    Local.reserve(static_cast<std::size_t>(Transforms.Num()));
-    for (const FTransform& Transform : Transforms)
-    {
-        Local.push_back(ToLocal(Transform));
-    }
-    return Local;
-}
-
-manipnet::RestSkeleton ToRest(const FReferenceSkeleton& Skeleton)
-{
-    manipnet::RestSkeleton Rest;
-    for (int32 Bone = 0; Bone < Skeleton.GetNum(); ++Bone)
-    {
-        Rest.Names.push_back(ToText(Skeleton.GetBoneName(Bone)));
-        Rest.Parents.push_back(Skeleton.GetParentIndex(Bone));
-    }
-    Rest.Local = ToLocal(Skeleton.GetRefBonePose());
-    return Rest;
-}
 
 /// The pose that an animation graph builds; a level of detail may lack bones.
 class FPose final : public manipnet::CharacterPose
@@ -69,10 +36,16 @@ private:
     FCompactPose& Pose;
 };
 
-double WeightOf(const FLiveLinkSkeletonStaticData& Static, const FLiveLinkAnimationFrameData& Frame)
+bool IsSolvedOnAvatar(const FLiveLinkSkeletonStaticData& Static)
 {
-    const int32 Index = Static.PropertyNames.IndexOfByKey(WeightName);
-    return Frame.PropertyValues.IsValidIndex(Index) ? static_cast<double>(Frame.PropertyValues[Index]) : 1.0;
+    return Static.PropertyNames.IndexOfByKey(FName(AvatarProperty)) != INDEX_NONE;
+}
+
+/// A property of the subject, or `Otherwise` if it has none of this name.
+double PropertyOf(const FLiveLinkSkeletonStaticData& Static, const FLiveLinkAnimationFrameData& Frame, const TCHAR* Name, double Otherwise)
+{
+    const int32 Index = Static.PropertyNames.IndexOfByKey(FName(Name));
+    return Frame.PropertyValues.IsValidIndex(Index) ? static_cast<double>(Frame.PropertyValues[Index]) : Otherwise;
 }
 }
 
@@ -84,13 +57,14 @@ struct FManipNetBinding
     int32 BoneCount = 0;
     FString BoneMap;
     bool bHasJoints = false;
+    bool bExact = false;
     manipnet::SubjectHand Subject;
     manipnet::Side Side = manipnet::Side::Left;
     manipnet::CharacterHand Character;
 
-    bool Fits(const TArray<FName>& InBones, const FReferenceSkeleton& InSkeleton, const FString& InMap) const
+    bool Fits(const FLiveLinkSkeletonStaticData& Static, const FReferenceSkeleton& InSkeleton, const FString& InMap) const
     {
-        return SubjectBones == InBones && Skeleton == &InSkeleton && BoneCount == InSkeleton.GetNum() && BoneMap == InMap;
+        return SubjectBones == Static.BoneNames && bExact == IsSolvedOnAvatar(Static) && Skeleton == &InSkeleton && BoneCount == InSkeleton.GetNum() && BoneMap == InMap;
     }
 
     void BindSubject(const FLiveLinkSkeletonStaticData& Static)
@@ -107,6 +81,7 @@ struct FManipNetBinding
             Parents.push_back(Parent);
         }
         bHasJoints = Subject.Bind(Names, Parents);
+        bExact = IsSolvedOnAvatar(Static);
         if (!bHasJoints)
         {
             UE_LOG(LogManipNet, Warning, TEXT("The subject has no hand: its bones must be the OpenXR joints, as those of ManipNet's subjects are."));
@@ -122,7 +97,8 @@ struct FManipNetBinding
         std::string Problem = manipnet::ParseBoneMap(TCHAR_TO_UTF8(*InMap), Map);
         if (Problem.empty())
         {
-            Problem = Character.Bind(ToRest(InSkeleton), Side, Map);
+            const manipnet::RestSkeleton Rest = ToRest(InSkeleton);
+            Problem = bExact ? Character.BindExactly(Rest, Side, Map) : Character.Bind(Rest, Side, Map);
         }
         if (!Problem.empty())
         {
@@ -151,7 +127,7 @@ void UManipNetRetargetAsset::BuildPoseFromAnimationData(float, const FLiveLinkSk
     }
     const FReferenceSkeleton& Skeleton = OutPose.GetBoneContainer().GetReferenceSkeleton();
     const std::vector<manipnet::LocalBone> Local = ToLocal(InFrameData->Transforms);
-    const bool bFits = Binding.IsValid() && Binding->Fits(InSkeletonData->BoneNames, Skeleton, BoneMap);
+    const bool bFits = Binding.IsValid() && Binding->Fits(*InSkeletonData, Skeleton, BoneMap);
     if (!bFits)
     {
         Binding = MakeShared<FManipNetBinding>();
@@ -168,5 +144,6 @@ void UManipNetRetargetAsset::BuildPoseFromAnimationData(float, const FLiveLinkSk
         Binding->BindCharacter(Skeleton, BoneMap);
     }
     FPose Pose(OutPose);
-    Binding->Character.Apply(Binding->Subject.Read(Local), bMoveWrist, WeightOf(*InSkeletonData, *InFrameData), Pose);
+    const double Weight = PropertyOf(*InSkeletonData, *InFrameData, WeightProperty, 1.0);
+    Binding->Character.Apply(Binding->Subject.Read(Local), bMoveWrist, Weight, Pose);
 }

@@ -1,5 +1,6 @@
 #include "ManipNetSettings.h"
 
+#include "Engine/SkeletalMesh.h"
 #include "LiveLinkSourceSettings.h"
 #include "ManipNetLiveLinkSourceSettings.h"
 
@@ -19,6 +20,9 @@ std::string Read(const UManipNetLiveLinkSourceSettings& Settings, manipnet::Conn
     To.Place.YawDegrees = Settings.Yaw;
     To.Place.Origin = {Settings.Origin.X, Settings.Origin.Y, Settings.Origin.Z};
     To.Place.Scale = Settings.Scale;
+    To.Avatar = ToText(Settings.Avatar.ToString());
+    To.AvatarBones = ToText(Settings.AvatarBoneMap);
+    To.ControlPort = static_cast<std::uint16_t>(Settings.ControlPort);
     return Problem;
 }
 
@@ -31,6 +35,9 @@ void Show(const manipnet::Connection& From, UManipNetLiveLinkSourceSettings& Set
     Settings.Yaw = From.Place.YawDegrees;
     Settings.Origin = FVector(From.Place.Origin.X, From.Place.Origin.Y, From.Place.Origin.Z);
     Settings.Scale = From.Place.Scale;
+    Settings.Avatar = TSoftObjectPtr<USkeletalMesh>(FSoftObjectPath(FString(UTF8_TO_TCHAR(From.Avatar.c_str()))));
+    Settings.AvatarBoneMap = UTF8_TO_TCHAR(From.AvatarBones.c_str());
+    Settings.ControlPort = From.ControlPort;
 }
 
 void ShowInLiveLink(const manipnet::Connection& From, ULiveLinkSourceSettings& Settings)

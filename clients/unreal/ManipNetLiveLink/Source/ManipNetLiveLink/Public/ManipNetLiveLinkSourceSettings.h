@@ -2,8 +2,11 @@
 
 #include "CoreMinimal.h"
 #include "LiveLinkSourceSettings.h"
+#include "UObject/SoftObjectPtr.h"
 
 #include "ManipNetLiveLinkSourceSettings.generated.h"
+
+class USkeletalMesh;
 
 /** How frames reach Live Link. */
 UENUM()
@@ -47,4 +50,20 @@ public:
 
     UPROPERTY(EditAnywhere, Category = "ManipNet", meta = (ClampMin = "0.001", ClampMax = "1000"))
     double Scale = 1.0;
+
+    /**
+     * Choose the character's skeletal mesh here, and the server solves contact on its bones: fingers that touch an object on
+     * the performer's hand touch it on the character's too. The subjects then have the mesh's name in theirs. Empty: the
+     * fingers turn as the performer's do.
+     */
+    UPROPERTY(EditAnywhere, Category = "ManipNet", meta = (DisplayName = "Solve On This Avatar"))
+    TSoftObjectPtr<USkeletalMesh> Avatar;
+
+    /** Bones of the avatar whose names are not known, in JSON: {"LeftHandIndex1": "a bone of the skeleton", ...}. */
+    UPROPERTY(EditAnywhere, AdvancedDisplay, Category = "ManipNet", meta = (MultiLine = "true"))
+    FString AvatarBoneMap;
+
+    /** Port for control in the server's line "ready", to which the hands of the avatar are sent. */
+    UPROPERTY(EditAnywhere, AdvancedDisplay, Category = "ManipNet", meta = (ClampMin = "1", ClampMax = "65535"))
+    int32 ControlPort = 5557;
 };

@@ -24,13 +24,26 @@ std::string Missing(const BoneIndices& bones) {
     return missing;
 }
 
+/// A bone whose child is nearer than this to it, relative to its distance from the hand, has no end there.
+constexpr double kSamePlace = 0.006;
+
+/// The scale of a bone in the space of the character.
+double ScaleOf(const RestSkeleton& skeleton, int bone) {
+    double scale = 1.0;
+    for (int up = bone; up >= 0; up = skeleton.Parents[static_cast<std::size_t>(up)])
+        scale *= skeleton.Local[static_cast<std::size_t>(up)].Scale;
+    return scale;
+}
+
 /// Removes the bones that do not hang on the hand, as when a map names them wrongly.
 void KeepDescendants(const std::vector<int>& parents, BoneIndices& bones) {
-    for (int& bone : bones.Fingers) {
+    const auto keep = [&](int& bone) {
         int above = bone;
         while (above >= 0 && above != bones.Hand) above = parents[static_cast<std::size_t>(above)];
         if (above < 0) bone = -1;
-    }
+    };
+    for (int& bone : bones.Fingers) keep(bone);
+    for (int& bone : bones.Metacarpals) keep(bone);
 }
 
 }  // namespace
@@ -41,19 +54,37 @@ std::string CharacterHand::Bind(const RestSkeleton& skeleton, Side side, const B
     KeepDescendants(Parents, Bones);
     AnyFinger = false;
     for (const int bone : Bones.Fingers) AnyFinger = AnyFinger || bone >= 0;
-    if (IsBound()) Rig = HandRig(side, RestOf(skeleton));
+    if (IsBound()) Rig = HandRig(side, RestOf(skeleton, 1.0));
     const std::string missing = Missing(Bones);
     return missing.empty() ? missing : std::string(side == Side::Left ? "left" : "right") + " hand: no bone for " + missing;
 }
 
-RestHand CharacterHand::RestOf(const RestSkeleton& skeleton) const {
+std::string CharacterHand::Profile(const RestSkeleton& skeleton, Side side, const BoneMap& map, HandProfile& profile) {
+    const std::string missing = Bind(skeleton, side, map);
+    return IsBound() ? MakeProfile(side, RestOf(skeleton, ScaleOf(skeleton, Bones.Hand)), profile) : missing;
+}
+
+std::string CharacterHand::BindExactly(const RestSkeleton& skeleton, Side side, const BoneMap& map) {
+    HandProfile profile;
+    const std::string problem = Profile(skeleton, side, map, profile);
+    if (problem.empty()) Rig = ExactRig(RestOf(skeleton, ScaleOf(skeleton, Bones.Hand)), profile);
+    return problem;
+}
+
+/// The bones at rest in the space of the hand bone, in units that `scale` makes of the hand bone's own.
+RestHand CharacterHand::RestOf(const RestSkeleton& skeleton, double scale) const {
     const auto inHand = [&](int bone) {
         LocalBone at = skeleton.Local[static_cast<std::size_t>(bone)];
         for (int up = Parents[static_cast<std::size_t>(bone)]; up != Bones.Hand; up = Parents[static_cast<std::size_t>(up)])
             at = Then(skeleton.Local[static_cast<std::size_t>(up)], at);
+        at.Translation = scale * at.Translation;
         return at;
     };
     RestHand rest;
+    for (std::size_t finger = 1; finger < kFingers; ++finger) {
+        rest.HasMetacarpal[finger] = Bones.Metacarpals[finger] >= 0;
+        if (rest.HasMetacarpal[finger]) rest.Metacarpals[finger] = inHand(Bones.Metacarpals[finger]).Translation;
+    }
     for (std::size_t i = 0; i < kFingerBones; ++i) {
         if (Bones.Fingers[i] < 0) continue;
         const LocalBone at = inHand(Bones.Fingers[i]);
@@ -62,9 +93,11 @@ RestHand CharacterHand::RestOf(const RestSkeleton& skeleton) const {
         rest.Rotations[i] = at.Rotation;
         rest.HasTip[i / 3] = false;
         for (std::size_t child = 0; child < Parents.size(); ++child) {
-            if (Parents[child] != Bones.Fingers[i] || Length(skeleton.Local[child].Translation) < 1e-6) continue;
+            if (Parents[child] != Bones.Fingers[i]) continue;
+            const Vec tip = inHand(static_cast<int>(child)).Translation;
+            if (Length(tip - at.Translation) <= kSamePlace * Length(at.Translation)) continue;
             rest.HasTip[i / 3] = true;  // the child of the last bone that is present
-            rest.Tips[i / 3] = inHand(static_cast<int>(child)).Translation;
+            rest.Tips[i / 3] = tip;
             break;
         }
     }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "BoneNames.h"
+#include "HandProfile.h"
 #include "HandRig.h"
 
 namespace manipnet {
@@ -31,6 +32,12 @@ public:
     /// nevertheless, if there is a hand.
     std::string Bind(const RestSkeleton& skeleton, Side side, const BoneMap& map);
 
+    /// As Bind, for hands that the server has solved on this character: every joint then is where the message says.
+    std::string BindExactly(const RestSkeleton& skeleton, Side side, const BoneMap& map);
+
+    /// Makes the profile of the hand. Returns an empty string, or why there is none.
+    std::string Profile(const RestSkeleton& skeleton, Side side, const BoneMap& map, HandProfile& profile);
+
     bool IsBound() const { return Bones.Hand >= 0 && AnyFinger; }
 
     /// Turns the fingers, and with `moveWrist` also the hand and the arm, so that the hand arrives at the tracked wrist,
@@ -42,7 +49,7 @@ private:
     void SetInCharacter(int bone, const Quat& rotation, CharacterPose& pose) const;
     void MoveWrist(const HandPose& hand, double weight, CharacterPose& pose) const;
     void TurnFingers(const HandPose& hand, double weight, CharacterPose& pose) const;
-    RestHand RestOf(const RestSkeleton& skeleton) const;
+    RestHand RestOf(const RestSkeleton& skeleton, double scale) const;
 
     BoneIndices Bones;
     bool AnyFinger = false;

@@ -1,0 +1,55 @@
+"""A take in the scene of one visitor, who does not see the live session meanwhile. Nobody else notices."""
+
+import threading
+from typing import Final
+
+import viser
+
+from manipnet.page.actor_view import Stage
+from manipnet.page.framing import FollowCamera, focus_of
+from manipnet.page.hand_look import HandLook
+from manipnet.page.playback import Recording
+from manipnet.page.show import LIVE
+
+TAKE: Final = "/take"
+
+
+class TakeView:
+    """Shows an instant of a recording to one visitor."""
+
+    def __init__(self, client: viser.ClientHandle, look: HandLook, camera: FollowCamera) -> None:
+        self._client, self._look, self._camera = client, look, camera
+        self._stage: Stage | None = None
+        self._drawing = threading.Lock()
+        self.recording: Recording | None = None
+        """The recording that is shown instead of the live session."""
+
+    def open(self, recording: Recording) -> None:
+        """Show a recording, and hide the live session from this visitor."""
+        self.close()
+        scene = self._client.scene
+        with self._drawing, self._client.atomic():
+            self._live = scene.add_frame(LIVE, show_axes=False, visible=False)
+            self._stage = Stage(scene, TAKE, self._look)
+            self.recording = recording
+        self._camera.restart()
+        self.seek(0.0)
+
+    def seek(self, second: float) -> None:
+        """Show the open recording at this many seconds from its beginning."""
+        with self._drawing, self._client.atomic():
+            if self.recording is None or self._stage is None:
+                return
+            frame = self.recording.at(second)
+            self._stage.show(frame, self.recording.shapes)
+        self._camera.follow(focus_of([frame]))
+
+    def close(self) -> None:
+        """Return this visitor to the live session."""
+        with self._drawing, self._client.atomic():
+            if self.recording is None or self._stage is None:
+                return
+            self._live.remove()
+            self._stage.remove()
+            self._stage = self.recording = None
+        self._camera.restart()

@@ -1,0 +1,108 @@
+"""The tab about what a visitor sees: camera, look-ahead, theme and layers. All but the look-ahead is his own."""
+
+import contextlib
+import threading
+from typing import Final
+
+import viser
+
+from manipnet.page.controls import Ask, Perform, by_visitor
+from manipnet.page.framing import FollowCamera
+from manipnet.page.html import legend
+from manipnet.page.overlays import LAYERS, OVERLAYS
+from manipnet.page.show import Show
+
+THEME: Final = "theme"
+ANSWER_S: Final = 20.0
+ACCENT: Final = (56, 132, 222)
+
+
+class ViewTab:
+    """Camera, theme and layers of one visitor; an operator also sets the look-ahead."""
+
+    def __init__(
+        self, ask: Ask, show: Show, client: viser.ClientHandle, camera: FollowCamera, perform: Perform, operator: bool
+    ) -> None:
+        self._show, self._client, self._camera = show, client, camera
+        self._dark = True
+        self._hidden: dict[str, viser.FrameHandle] = {}
+        self._layers = frozenset[str]()
+        gui = client.gui
+        if operator:
+            slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
+            slider.on_update(
+                by_visitor(lambda: perform(lambda: _nothing(ask(op="look_ahead", seconds=1e-3 * slider.value))))
+            )
+            self._look_ahead = slider
+        self._follow = gui.add_button(
+            "Follow the hands", icon=viser.Icon.FOCUS_2, hint="key C; the camera follows until you move it"
+        )
+        self._follow.on_click(lambda _: self.follow())
+        gui.add_command("Follow the hands", hotkey="C").on_trigger(lambda _: self.follow())
+        self._theme = gui.add_button("Light theme", icon=viser.Icon.SUN)
+        self._theme.on_click(lambda _: self._switch_theme())
+        gui.add_markdown("**Layers**")
+        for name, layer in OVERLAYS.items():
+            self._hide(name)
+            box = gui.add_checkbox(layer.label, False)
+            gui.add_html(legend(layer))
+            box.on_update(lambda event, name=name: self._set_layer(name, event.target.value))
+        self._apply_theme()
+        threading.Thread(target=self._remember_theme, name="theme", daemon=True).start()
+
+    def refresh(self, look_ahead_s: float) -> None:
+        """Show whether the camera follows, and the look-ahead that is in force."""
+        self._follow.disabled = self._camera.following
+        slider = getattr(self, "_look_ahead", None)
+        if slider is not None and abs(slider.value - 1e3 * look_ahead_s) > 0.5:
+            slider.value = round(1e3 * look_ahead_s)
+
+    def follow(self) -> None:
+        """Give the camera back."""
+        self._show.settle()
+        self._camera.restart()
+        self._follow.disabled = True
+
+    def close(self) -> None:
+        """Forget the layers: the visitor has left."""
+        self._show.want_layers(self._client.client_id, frozenset())
+
+    def _set_layer(self, name: str, visible: bool) -> None:
+        self._layers = self._layers | {name} if visible else self._layers - {name}
+        self._show.want_layers(self._client.client_id, self._layers)
+        if visible and name in self._hidden:
+            self._hidden.pop(name).remove()
+        elif not visible:
+            self._hide(name)
+
+    def _hide(self, name: str) -> None:
+        """Hide a layer from this visitor, whoever else looks at it."""
+        if name not in self._hidden:
+            self._hidden[name] = self._client.scene.add_frame(f"{LAYERS}/{name}", show_axes=False, visible=False)
+
+    def _switch_theme(self) -> None:
+        self._dark = not self._dark
+        self._apply_theme()
+        self._client.local_storage.set_item(THEME, "dark" if self._dark else "light")
+
+    def _remember_theme(self) -> None:
+        """Use the theme that this browser used before; runs on a thread of its own, because it waits for the answer."""
+        with contextlib.suppress(RuntimeError, TimeoutError):  # he has left, or his browser stores nothing
+            if self._client.local_storage.get_item(THEME, ANSWER_S) == "light":
+                self._dark = False
+                self._apply_theme()
+
+    def _apply_theme(self) -> None:
+        self._client.gui.configure_theme(
+            dark_mode=self._dark,
+            show_logo=False,
+            show_share_button=False,
+            brand_color=ACCENT,
+            control_width="medium",
+        )
+        self._theme.label = "Light theme" if self._dark else "Dark theme"
+        self._theme.icon = viser.Icon.SUN if self._dark else viser.Icon.MOON
+
+
+def _nothing(_: object) -> None:
+    return None
