@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,10 +32,10 @@ console.log(execFileSync("node", [script, client, modules, ...files], { timeout:
 """
 
 
-def in_node(*words: str) -> dict:
-    """What `avatar.mjs` prints."""
-    script = ROOT / "tests" / "clients" / "web" / "avatar.mjs"
-    return run_node(RUN, str(script), str(CLIENTS / "web"), *words, packages=PACKAGES)
+def in_node(*words: str, script: str = "avatar.mjs") -> Any:
+    """What a script prints."""
+    path = ROOT / "tests" / "clients" / "web" / script
+    return run_node(RUN, str(path), str(CLIENTS / "web"), *words, packages=PACKAGES)
 
 
 def rig(path: Path, fingers: float = 0.85, bend: float = 0.0) -> Path:
@@ -84,6 +85,12 @@ def compare(ours, theirs) -> None:
         np.testing.assert_allclose(a.joints[:, :3], b.joints[:, :3], atol=5e-4)
         assert np.nanmin(np.abs(np.sum(a.joints[:, 3:] * b.joints[:, 3:], axis=1))) > 0.9999
         np.testing.assert_allclose(a.radii, b.radii, atol=5e-4)
+
+
+def test_arms_reach_the_wrist_and_keep_their_lengths() -> None:
+    for shown in in_node(script="arm.mjs"):
+        assert max(shown["tip"], shown["hand"]) < 1e-5
+        np.testing.assert_allclose(shown["arm"], np.hypot(0.25, np.hypot(0.02, 0.02)), atol=1e-6)
 
 
 @pytest.fixture(scope="module")
