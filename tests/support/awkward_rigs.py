@@ -64,7 +64,7 @@ def _write(path: Path, names: list[str], parents: list[int], world: np.ndarray) 
     attributes = {
         "POSITION": buffer.add(vertices.astype(np.float32), bounds=True),
         "JOINTS_0": buffer.add(owners),
-        "WEIGHTS_0": buffer.add(np.tile(np.float32([1, 0, 0, 0]), (len(vertices), 1))),
+        "WEIGHTS_0": buffer.add(np.tile(np.array([1, 0, 0, 0], np.float32), (len(vertices), 1))),
     }
     primitive = {"attributes": attributes, "indices": buffer.add(faces.astype(np.uint16)), "material": 0}
     inverse = np.linalg.inv(world)

@@ -132,7 +132,7 @@ def _read_synthesised(path: Path, model: Hand) -> Animation:
         objects[name] = BodyTrack(arrays["object_poses"][k], seen)
         if f"object_{k}_faces" in arrays:
             meshes[name] = closed_mesh(arrays[f"object_{k}_vertices"], arrays[f"object_{k}_faces"], name)
-    joints = {side: arrays[name] for side in SIDES if (name := f"{side}_hand_joints") in arrays}
+    joints: dict[Side, Array] = {side: arrays[name] for side in SIDES if (name := f"{side}_hand_joints") in arrays}
     return Animation(path.stem, TICK_HZ, time_s, hands, objects, meshes, timecode_of(arrays), joints)
 
 
