@@ -5,6 +5,7 @@ that it solves on them, and turn the characters' bones. Every fingertip must be 
 """
 
 import json
+import re
 import threading
 import time
 
@@ -44,9 +45,12 @@ def rests(language, kind, seed=0):
 
 
 def test_the_vectors_are_those_of_the_import():
-    assert (VECTORS / "hand_profiles.json").read_text(encoding="utf-8") == vectors(), (
-        "run tests/vectors/make_hand_profiles.py"
-    )
+    """Apart from the last digits, which differ between machines."""
+    written, made = (VECTORS / "hand_profiles.json").read_text(encoding="utf-8"), vectors()
+    number = re.compile(r"-?\d+\.\d+(?:e-?\d+)?")
+    assert number.sub("0", written) == number.sub("0", made), "run tests/vectors/make_hand_profiles.py"
+    ours, theirs = (np.array(number.findall(text), float) for text in (written, made))
+    np.testing.assert_allclose(ours, theirs, atol=2e-6, err_msg="run tests/vectors/make_hand_profiles.py")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -325,30 +329,30 @@ def test_unreal_source_says_why_it_cannot_solve_on_an_avatar(unreal, stage):
         client.kill()
 
 
-def test_unreal_nodes_control_the_server(unreal, stage):
-    client = unreal_character(unreal, stage.server, avatar_rig("manny"), 1.0)
-    address = stage.server.addresses["control"]
-    to_client, from_client = client.process.stdin, client.process.stdout
-    assert to_client is not None
-    assert from_client is not None
+def test_unreal_nodes_control_the_server(unreal, tiny_bundle, tmp_path):
+    with serving("--model", str(tiny_bundle), "--takes", str(tmp_path)) as server:
+        client = unreal_character(unreal, server, avatar_rig("manny"), 1.0)
+        asked, answers = client.process.stdin, client.process.stdout
+        assert asked is not None
+        assert answers is not None
 
-    def ask(words, to=address):
-        to_client.write(f"request {to} {words}\n")
-        to_client.flush()
-        return from_client.readline().rstrip("\n")
+        def ask(words, to=server.addresses["control"]):
+            asked.write(f"request {to} {words}\n")
+            asked.flush()
+            return answers.readline().rstrip("\n")
 
-    try:
-        pin, reply = ask("pause").split(" ", 1)
-        assert (pin, json.loads(reply)["paused"]) == ("replied", True)
-        assert ask('{"op": "pause", "on": false}').startswith("replied {")
-        assert ask("record").startswith("refused ")
-        assert ask("record").count("--takes") == 1, "the server of this test keeps no takes, and says so"
-        assert 'mug \\"x\\"' in ask("select") or "mug" in ask("select")
-        assert ask("{").startswith("refused ")
-        assert ask("stop", "tcp://127.0.0.1:1") == "refused no server answers at 127.0.0.1:1"
-        assert ask("stop", "udp://x").startswith("refused the address is")
-    finally:
-        client.kill()
+        try:
+            pin, reply = ask("pause").split(" ", 1)
+            assert (pin, json.loads(reply)["paused"]) == ("replied", True)
+            assert ask('{"op": "pause", "on": false}').startswith("replied {")
+            assert json.loads(ask("record").removeprefix("replied "))["name"].startswith("a take")
+            assert ask("stop").startswith("replied {")
+            assert ask("select").startswith("refused "), "there is no body Box"
+            assert ask("{").startswith("refused ")
+            assert ask("stop", "tcp://127.0.0.1:1") == "refused no server answers at 127.0.0.1:1"
+            assert ask("stop", "udp://x").startswith("refused the address is")
+        finally:
+            client.kill()
 
 
 def last_bone(rest, finger):
