@@ -1,7 +1,6 @@
 """Every control of the live page, clicked in a real browser, and what the server makes of it."""
 
 import contextlib
-import json
 import shutil
 import threading
 import time
@@ -12,15 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Page, another, browsing
+from browser import Page, browsing
 from live_server import LiveServer, Sender, Subscriber, serving
 
 from manipnet.actors.calibration import difference, sheet_at, wrist_on_sheet
-from manipnet.geometry import Side, compose, invert, quat_exp, transform
-from manipnet.page.frames import Frame
-from manipnet.page.framing import FIELD_OF_VIEW_RAD, UP, Focus, camera_position, focus_of
+from manipnet.geometry import Side, compose, invert, quat_exp
 from manipnet.page.overlays import OVERLAYS
-from manipnet.recording.mcap_file import read_hands
 from manipnet.wire import HandsMessage
 
 PATIENCE_S = 90.0
@@ -207,146 +203,6 @@ def test_changes_are_undone_reset_and_saved(studio: Studio) -> None:
     assert "# taped" in studio.rig.read_text()
     studio.page.click("Reset")
     studio.until(lambda _: studio.box()["object"] == "cube")
-
-
-def test_the_gizmo_moves_the_object_on_its_body(studio: Studio) -> None:
-    page = studio.page
-    page.click("Objects")
-    page.tick("Drag to move")
-    page.key("c")  # the camera frames what happens
-    before = studio.box()["position"]
-    message = studio.until(lambda message: len(message.hands) == 2)
-    focus = focus_of([Frame(message, (), {}, {})])
-    assert focus is not None
-    prop = pose_of(message, "Box")
-    x, y, width, height = page.wait_for(f"{PLACE}", PATIENCE_S)
-    start, end = (
-        on_screen(focus, transform(prop, np.array([along_m, 0.0, 0.0])), width, height) for along_m in (0.1, 0.16)
-    )
-    page.drag((x + start[0], y + start[1]), (x + end[0], y + end[1]))
-    studio.until(lambda _: studio.box()["position"][0] > before[0] + 0.02)
-    page.click("Objects")
-    page.click("Undo")
-    studio.until(lambda _: studio.box()["position"] == pytest.approx(before, abs=1e-6))
-    page.tick("Drag to move")
-
-
-def on_screen(focus: Focus, point: np.ndarray, width: float, height: float) -> tuple[float, float]:
-    """Where a point of the world is on the stage, in pixels, seen by the camera that follows."""
-    position = camera_position(focus, width / height)
-    forward = focus.center - position
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, UP)
-    right /= np.linalg.norm(right)
-    away = point - position
-    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW_RAD) / (away @ forward)
-    return 0.5 * width + scale * (away @ right), 0.5 * height - scale * (away @ np.cross(right, forward))
-
-
-def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Studio) -> None:
-    page = studio.page
-    page.click("Takes")
-    page.type("Slate", "12A")
-    studio.says("Record makes: 12A take 1")
-    page.key("r")  # it is typed into no field
-    page.wait_for("document.querySelector('.mn-recording') !== null", PATIENCE_S)
-    studio.says("REC 0:0")
-    page.wait_for("document.body.innerText.includes('Stop recording 0:0')", PATIENCE_S)
-    page.key("r")
-    page.wait_for("document.querySelector('.mn-recording') === null", PATIENCE_S)
-    page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === '12A take 1.mcap')", PATIENCE_S)
-    take = studio.takes / "12A take 1.mcap"
-    assert sum(1 for _ in read_hands(take)) > 0
-    studio.says("Record makes: 12A take 2")
-    page.click("Show this take")
-    studio.says(f"▶ {take.name}")
-    with another(page) as other:
-        other.wait_for(f"{TEXT}.includes('● Live')", PATIENCE_S)
-        assert not other.evaluate(f"{TEXT}.includes('Back to live')")
-    page.type("Time, s", "0.02")
-    page.click("Play")
-    page.wait_for(f"{TEXT}.includes('Pause playback')", PATIENCE_S)
-    page.key(" ")
-    page.wait_for(f"!{TEXT}.includes('Pause playback')", PATIENCE_S)
-    page.type("Time, s", "0")
-    page.key("ArrowRight")
-    page.wait_for(f"{SECOND} === '0.02'", PATIENCE_S)
-    page.key("ArrowLeft")
-    page.wait_for(f"{SECOND} === '0'", PATIENCE_S)
-    page.click("Back to live")
-    studio.says("● Live")
-    page.click("Show this take")
-    studio.says(f"▶ {take.name}")
-    page.call("Page.reload")
-    studio.says("● Live")
-
-
-def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
-    page = studio.page
-    page.click("Takes")
-    page.wait_for("[...document.querySelectorAll('input')].some(one => one.value.startsWith('12A take 1'))", PATIENCE_S)
-    page.type("Note", "ran r r", field="textarea", enter=False)
-    page.key("r")
-    page.click("Takes")  # the text is kept when its field is left
-    studio.says("note is kept")
-    assert studio.server.ask({"op": "recordings"})["recording"] is None
-
-
-def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> None:
-    page = studio.page
-    page.click("Takes")
-    page.type("Name", "best of all")
-    studio.until(lambda _: (studio.takes / "best of all.mcap").exists())
-    notes = json.loads((studio.takes / "best of all.json").read_text())
-    assert notes == {"slate": "12A", "number": 1, "note": "ran r rr"}
-    page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(studio.rig.parent))
-    page.click("Download")
-    copy = studio.rig.parent / "best of all.mcap"
-    studio.until(lambda _: copy.exists() and copy.stat().st_size == (studio.takes / copy.name).stat().st_size)
-    page.click("Delete …")
-    page.click("Keep it", PATIENCE_S)
-    page.click("Delete …")
-    page.click("Delete it", PATIENCE_S)
-    studio.until(lambda _: not list(studio.takes.iterdir()))
-
-
-def test_the_camera_is_taken_and_given_back(studio: Studio) -> None:
-    page = studio.page
-    page.click("View")
-    page.wait_for(f"{FOLLOWING}", PATIENCE_S)
-    x, y = page.evaluate(STAGE)
-    page.drag((x, y + 120), (x + 90, y + 150))
-    page.wait_for(f"!{FOLLOWING}", PATIENCE_S)
-    page.click("Follow the hands")
-    page.wait_for(f"{FOLLOWING}", PATIENCE_S)
-
-
-def test_the_theme_is_light_or_dark_and_remembered(studio: Studio) -> None:
-    page, scheme = studio.page, "document.documentElement.dataset.mantineColorScheme"
-    page.click("View")
-    page.wait_for(f"{scheme} === 'dark'", PATIENCE_S)
-    page.click("Light theme")
-    page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
-    page.call("Page.reload")
-    page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
-    page.click("Dark theme", PATIENCE_S)
-    page.wait_for(f"{scheme} === 'dark'", PATIENCE_S)
-
-
-def test_a_tablet_shows_stage_and_controls_side_by_side(studio: Studio) -> None:
-    page = studio.page
-    page.call("Emulation.setDeviceMetricsOverride", width=768, height=1024, deviceScaleFactor=1, mobile=True)
-    page.call("Page.reload")
-    studio.says("● Live")
-    page.wait_for(f"({STAGE})[0] > 0 && innerWidth === 768", PATIENCE_S)
-    width = page.wait_for("parseFloat(getComputedStyle(document.documentElement).getPropertyValue('--mn-width'))")
-    assert width > 350
-    assert page.evaluate("document.documentElement.scrollWidth") == 768
-    page.click("Takes", PATIENCE_S)
-    page.wait_for(f"{TEXT}.includes('Record makes')", PATIENCE_S)
-    page.call("Emulation.setDeviceMetricsOverride", width=1000, height=700, deviceScaleFactor=1, mobile=False)
-    page.call("Page.reload")
-    studio.says("● Live")
 
 
 def test_wrists_are_calibrated_and_the_quality_is_told(studio: Studio) -> None:
