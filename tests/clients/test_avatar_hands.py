@@ -328,13 +328,14 @@ def test_unreal_source_says_why_it_cannot_solve_on_an_avatar(unreal, stage):
 def test_unreal_nodes_control_the_server(unreal, stage):
     client = unreal_character(unreal, stage.server, avatar_rig("manny"), 1.0)
     address = stage.server.addresses["control"]
-    assert client.process.stdin is not None
-    assert client.process.stdout is not None
+    to_client, from_client = client.process.stdin, client.process.stdout
+    assert to_client is not None
+    assert from_client is not None
 
     def ask(words, to=address):
-        client.process.stdin.write(f"request {to} {words}\n")
-        client.process.stdin.flush()
-        return client.process.stdout.readline().rstrip("\n")
+        to_client.write(f"request {to} {words}\n")
+        to_client.flush()
+        return from_client.readline().rstrip("\n")
 
     try:
         pin, reply = ask("pause").split(" ", 1)

@@ -14,7 +14,7 @@ from checkout import ROOT, need, publishing
 from make_vectors import messages
 from publisher import message
 
-from manipnet.geometry import SIDES, compose, invert, quat_exp, quat_rotate, quat_to_matrix
+from manipnet.geometry import SIDES, Side, compose, invert, quat_exp, quat_rotate, quat_to_matrix
 from manipnet.outputs.websocket.server import WebSocketPublisher
 from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -108,7 +108,7 @@ def posed(seed: int) -> HandsMessage:
     wrists = np.array([[*rng.normal(size=3), *quat_exp(rng.normal(size=3))] for _ in SIDES])
     angles = rng.uniform(*MODEL.limits.T, size=(2, MODEL.angle_count))
     rotations, joints = pose_in_world(MODEL, SIDES, angles, wrists, 1.0)
-    hands = {
+    hands: dict[Side, HandPose] = {
         side: HandPose("live", None, 1.0, angles[i], rotations[i], wrists[i], joints[i]) for i, side in enumerate(SIDES)
     }
     return HandsMessage("s", "actor", 1, 0.0, 0.0, 0.5, hands)

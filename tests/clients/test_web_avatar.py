@@ -14,7 +14,7 @@ from live_server import Stage, scene
 from npm import run_node
 from rig_writer import write_glb
 
-from manipnet.geometry import SIDES, quat_exp, quat_rotate
+from manipnet.geometry import SIDES, Side, quat_exp, quat_rotate
 from manipnet.synthesis.hand.avatar import model_profile
 from manipnet.synthesis.hand.profile import FINGERS, parse_profile
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -70,7 +70,7 @@ def test_a_profile_is_that_of_the_import(tmp_path: Path, bend: float) -> None:
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_a_profile_of_a_skinned_hand_is_that_of_the_import(side: str, tmp_path: Path) -> None:
+def test_a_profile_of_a_skinned_hand_is_that_of_the_import(side: Side, tmp_path: Path) -> None:
     where = f"@webxr-input-profiles/assets/dist/profiles/generic-hand/{side}.glb"
     ours = parse_profile(in_node("profile", f"npm:{where}", json.dumps({"side": side})))
     assert not np.isnan(ours.hands[side].radii[7])

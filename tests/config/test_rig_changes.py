@@ -65,7 +65,9 @@ def test_objects_places_and_the_look_ahead_are_saved_and_comments_stay(tmp_path:
         ("Box", "hammer.ply", 1.5),
         ("Cup", "own.ply", 1.0),
     ]
-    np.testing.assert_allclose(saved.actors[0].objects[0].body.offset, place)
+    offset = saved.actors[0].objects[0].body.offset
+    assert offset is not None
+    np.testing.assert_allclose(offset, place)
 
 
 def test_what_has_not_changed_is_not_written(tmp_path: Path) -> None:

@@ -169,7 +169,8 @@ def test_a_hand_in_its_t_pose_is_sent_without_turns():
         u, _, v = np.linalg.svd(t_pose[[7, 12, 22]].T @ hand.joints[[7, 12, 22], :3])
         turn = matrix_to_quat(u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v)
         wrist = np.array([0.0, 1.0, 0.0, *turn])
-        hands[side] = HandPose("live", None, 1.0, np.zeros(20), np.tile([0.0, 0.0, 0.0, 1.0], (17, 1)), wrist, compose(wrist, hand.joints))
+        still = np.tile([0.0, 0.0, 0.0, 1.0], (17, 1))
+        hands[side] = HandPose("live", None, 1.0, np.zeros(20), still, wrist, compose(wrist, hand.joints))
     for pose in sent(profile, hands).values():
         np.testing.assert_allclose(pose[3:] * np.sign(pose[6]), [0, 0, 0, 1], atol=1e-5)
 

@@ -13,8 +13,8 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable
 from pathlib import Path
+from typing import IO
 
 import pytest
 from live_server import free_ports
@@ -35,9 +35,10 @@ def program(word: str) -> list[str]:
     return [sys.executable, "-m", {"manipnet": "manipnet_tools.cli", "manipnet-serve": "manipnet.cli"}[word]]
 
 
-def forward(stream: Iterable[str], lines: "queue.Queue[str]") -> None:
-    for line in stream:
-        lines.put(line)
+def forward(stream: IO[str], lines: "queue.Queue[str]") -> None:
+    with stream:
+        for line in stream:
+            lines.put(line)
 
 
 @pytest.mark.slow
@@ -45,6 +46,7 @@ def forward(stream: Iterable[str], lines: "queue.Queue[str]") -> None:
 def test_the_walk_can_be_followed(tmp_path: Path) -> None:
     environment = {**os.environ, "BROWSER": "true"}
     server: subprocess.Popen[str] | None = None
+    reader: threading.Thread | None = None
     lines: queue.Queue[str] = queue.Queue()
     control = ""
     done: list[str] = []
@@ -55,7 +57,8 @@ def test_the_walk_can_be_followed(tmp_path: Path) -> None:
                 server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=tmp_path, env=environment)
                 stdout = server.stdout
                 assert stdout is not None
-                threading.Thread(target=forward, args=(stdout, lines), daemon=True).start()
+                reader = threading.Thread(target=forward, args=(stdout, lines), daemon=True)
+                reader.start()
                 words = lines.get(timeout=PATIENCE_S).split()
                 control = words[words.index("control") + 1]
                 while "bodies arrive" not in lines.get(timeout=PATIENCE_S):
@@ -80,6 +83,8 @@ def test_the_walk_can_be_followed(tmp_path: Path) -> None:
         if server is not None:
             server.kill()
             server.wait()
+        if reader is not None:
+            reader.join(PATIENCE_S)
     assert done == ["--version", "bench", "doctor", "record", "synthesize", "export", "export"]
     about = read_about(tmp_path / "mug 1.mcap")
     assert about.whole

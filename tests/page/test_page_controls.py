@@ -82,7 +82,10 @@ class Studio:
 
     def box(self) -> dict[str, Any]:
         """What the body Box carries, as the server says."""
-        return self.server.ask({"op": "objects"})["bodies"]["actor"]["Box"]
+        give_up_s = time.monotonic() + PATIENCE_S
+        while "bodies" not in (answer := self.server.ask({"op": "objects"})):  # a busy machine refuses some
+            assert time.monotonic() < give_up_s, answer
+        return answer["bodies"]["actor"]["Box"]
 
     def disabled(self, button: str) -> bool:
         """Whether a button cannot be clicked."""

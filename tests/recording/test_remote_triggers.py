@@ -226,6 +226,8 @@ def test_motive_begins_names_and_ends_a_recording(sending: Sending) -> None:
         "session_name": "Tuesday",
     }
     assert "model_hash" in about.metadata
+    takes = sending.server.ask({"op": "recordings", "notes": True})["takes"]
+    assert [take["note"] for take in takes if take["name"] == "Take 1.mcap"] == ["second try & last"]
 
 
 def test_osc_begins_and_ends_a_recording_and_never_overwrites(sending: Sending) -> None:

@@ -14,6 +14,7 @@ from manipnet.recording.mcap_file import read_about
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 from manipnet.wire import SIDES
 from manipnet_tools import cli
+from manipnet_tools.commands.verbs import VERBS
 
 CUBE = LIBRARY_FOLDER / "cube.ply"
 
@@ -29,7 +30,7 @@ def error_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return capsys.readouterr().err
 
 
-@pytest.mark.parametrize("verb", cli.VERBS)
+@pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_a_help_text(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="0"):
         cli.main([verb, "--help"])
@@ -41,7 +42,7 @@ def test_every_verb_has_a_help_text(verb: str, capsys: pytest.CaptureFixture[str
 def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--help"]) == 0
     text = capsys.readouterr().out
-    assert all(f"  {verb} " in text for verb in cli.VERBS)
+    assert all(f"  {verb} " in text for verb in VERBS)
     assert "examples:" in text
     assert cli.main([]) == 2
     assert cli.main(["--version"]) == 0
@@ -49,7 +50,7 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
 
 HEAVY = {"matplotlib", "numba", "onnx", "onnxruntime", "ray", "scipy", "torch", "trimesh", "viser", "zmq"}
 """Libraries that take long to load."""
-HELP = [[verb, "--help"] for verb in cli.VERBS] + [["rig", "init", "--help"], ["rig", "show", "--help"]]
+HELP = [[verb, "--help"] for verb in VERBS] + [["rig", "init", "--help"], ["rig", "show", "--help"]]
 MISTYPED = [
     line.split()
     for line in (

@@ -2,9 +2,11 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Array
@@ -12,7 +14,7 @@ from tomlkit.items import Array
 from manipnet.common.options import ConfigError
 from manipnet.config.rig_reader import parse_rig
 from manipnet.config.rig_writer import BACKUP_SUFFIX, is_entry_of, replace_file, with_placements
-from manipnet.config.settings import ActorConfig, ObjectConfig
+from manipnet.config.settings import ActorConfig, BodyConfig, ObjectConfig
 from manipnet.synthesis.model.providers import MAX_LOOK_AHEAD_S
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 
@@ -30,7 +32,9 @@ def save_changes(path: Path, actors: Sequence[ActorConfig], look_ahead_s: float,
         before = path.read_bytes().decode("utf-8-sig")
         after = _with_look_ahead(before, path, look_ahead_s)
         for actor in actors:
-            after = with_placements(_with_objects(after, path, actor), actor)
+            after = with_placements(
+                _with_objects(after, path, actor), _moved(actor, _actor_in(before, path, actor.name))
+            )
         _check(after, path, actors, look_ahead_s)
         return replace_file(path, after, backup) if after != before else path.with_name(path.name + BACKUP_SUFFIX)
     except (OSError, ValueError, TOMLKitError, KeyError, TypeError) as error:
@@ -80,6 +84,22 @@ def _appended(table: Any) -> Any:
     is_array = isinstance(table["objects"], Array)
     table["objects"].append(tomlkit.inline_table() if is_array else tomlkit.table())
     return table["objects"][-1]
+
+
+def _moved(actor: ActorConfig, before: ActorConfig) -> ActorConfig:
+    """The actor with the placements that differ from those of before, and no others."""
+    known = before.bodies()
+
+    def only_new(role: str, body: BodyConfig) -> BodyConfig:
+        old = known[role].offset if role in known else None
+        same = old is not None and body.offset is not None and np.allclose(old, body.offset, atol=_SAME)
+        return replace(body, offset=None) if same else body
+
+    return replace(
+        actor,
+        wrists={role: only_new(role, body) for role, body in actor.wrists.items()},
+        objects=tuple(replace(thing, body=only_new(thing.name, thing.body)) for thing in actor.objects),
+    )
 
 
 def _mesh(thing: ObjectConfig, path: Path) -> str:

@@ -15,6 +15,7 @@ from typing import Final
 import viser
 
 from manipnet.page.frames import Frame
+from manipnet.page.framing import begin_at_the_table
 from manipnet.page.hand_choices import HandChoices, is_avatar
 from manipnet.page.hand_look import HandLook, look_of
 from manipnet.page.panel import Panel
@@ -50,6 +51,7 @@ class Page:
     def open(self, server: viser.ViserServer) -> None:
         """Set up the scene and let visitors in."""
         self._show = Show(server, self._look, self._follow)
+        begin_at_the_table(server.initial_camera)
         self._hands = HandChoices(self._link, self._show)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)

@@ -25,9 +25,10 @@ LEASH: Final = 0.25
 """What happens may leave the centre of the picture by this share of its radius before the camera follows."""
 FOLLOW_S: Final = 1.2
 """The time constant with which the camera follows."""
-SAME_M: Final = 1e-4
-REMEMBERED: Final = 90
-"""Poses that the camera was given; what the browser reports is one of them unless the visitor has moved it."""
+SAME_M: Final = 1e-3
+REMEMBERED: Final = 600
+"""Poses that the camera was given, of 20 s, since a busy browser answers late. What it reports is one of them unless
+the visitor has moved the camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +71,14 @@ def camera_position(focus: Focus, aspect: float) -> Array:
 
 def _is_near(point: Array, joints: Array) -> bool:
     return bool(np.linalg.norm(joints - point, axis=1).min() < NEAR_M)
+
+
+def begin_at_the_table(camera: viser.InitialCameraConfig) -> None:
+    """Let every browser look at the empty table until its camera follows what happens."""
+    camera.up = (0.0, 1.0, 0.0)
+    camera.fov = FIELD_OF_VIEW_RAD
+    camera.position = camera_position(NOTHING, 1.0)
+    camera.look_at = NOTHING.center
 
 
 class FollowCamera:
@@ -126,11 +135,9 @@ class FollowCamera:
     async def _reported(self, camera: viser.CameraHandle) -> None:
         """Compare what the browser reports with what it was given: another pose means that the visitor moved it."""
         position, look_at = np.array(camera.position), np.array(camera.look_at)
-        given = list(self._given)  # the drawing thread adds to it
-        is_given = any(np.abs(position - known).max() < SAME_M for known, _ in given) and any(
-            np.abs(look_at - known).max() < SAME_M for _, known in given
-        )
-        if is_given:
+        given = np.array(list(self._given)).reshape(-1, 2, 3)  # the drawing thread adds to it meanwhile
+        is_same = np.abs(given - np.stack([position, look_at])).max(axis=2, initial=0.0) < SAME_M
+        if is_same.any(axis=0).all():
             self._echoed = True
         elif self._echoed and self.following:
             self.following = False

@@ -76,6 +76,7 @@ class Recorder:
         `about` is added to its metadata. Raises `RequestError`.
         """
         with self._lock:
+            self._check_free()
             self._check_space()
             path = free_path(self._folder, safe_name(name, self._folder))
             self._open = self._begin(path, about)
@@ -88,13 +89,17 @@ class Recorder:
     def _record(self, request: Request) -> dict[str, Any]:
         path = recording_path(self._folder, request.get("name", time_name()))
         with self._lock:
-            if (recording := self.current()) is not None:
-                raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
+            self._check_free()
             self._check_space()
             if path.exists():
                 raise RequestError(f"{path.name} already exists; give another name")
             self._open = self._begin(path)
         return {"name": path.name, "folder": str(self._folder.resolve())}
+
+    def _check_free(self) -> None:
+        """Raise `RequestError` while something is being recorded."""
+        if (recording := self.current()) is not None:
+            raise RequestError(f"{recording.path.name} is being recorded; end it with stop_recording first")
 
     def _check_space(self) -> None:
         """Raise `RequestError` if the disk is full: a recording that has begun could only be cut off."""

@@ -9,6 +9,7 @@ from typing import Final
 from manipnet.control.request import RequestError
 from manipnet.recording.open_recording import OpenRecording
 from manipnet.recording.recorder import Recorder
+from manipnet.recording.take_notes import MAX_NOTE, write_notes
 from manipnet.telemetry import Telemetry
 from manipnet.wire.record_trigger import RecordTrigger
 
@@ -83,6 +84,8 @@ class TriggeredRecordings:
         about = {**trigger.about, **({"take": trigger.name} if trigger.name else {}), "trigger": trigger.source}
         path = self._recorder.begin(trigger.name, about)
         self._own, self._requested = self._recorder.current(), trigger.name
+        if note := trigger.about.get("notes"):
+            write_notes(path, {"note": note[:MAX_NOTE]})
         _log.info("%s has begun the recording %s", trigger.source, path.name)
         return "started"
 

@@ -37,6 +37,8 @@ RATIOS: Final = (0.75, 1.3)
 """Ratios of lengths beyond these count as these, or the fingers of a giant would come too late."""
 CALM_POWER: Final = 4.0
 """How much more firmly longer fingers are kept to the last tick's difference from the model."""
+SHORT_CALM_POWER: Final = 1.0
+"""How much less firmly shorter fingers are; they work at the end of their reach, where a loose one trembles."""
 _ALONG: Final = (1.0 / 3.0, 2.0 / 3.0, 1.0)
 _ALONG_TIP: Final = (0.25, 0.5, 0.75, 1.0)
 _ALONG_PALM: Final = (0.3, 0.65, 1.0)
@@ -73,7 +75,7 @@ class HandCarrier:
         self._angles: Array | None = None
         ratio = min(max(avatar.length_ratio, RATIOS[0]), RATIOS[1])
         self._pace = 1.0 / max(ratio, 1.0) ** PACE_POWER
-        self._calm = CALM_WEIGHT_M2 * ratio**CALM_POWER
+        self._calm = CALM_WEIGHT_M2 * ratio ** (CALM_POWER if ratio > 1.0 else SHORT_CALM_POWER)
         self._signs = mirror_poses(np.ones(7)) if side == "left" else np.ones(7)
         self._followed: Array | None = None
 

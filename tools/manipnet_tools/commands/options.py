@@ -32,10 +32,12 @@ OTHER_FORMATS: Final = {
     "obj": _GLTF.format("OBJ"),
     "abc": _GLTF.format("Alembic"),
     "glb": "gltf writes a .glb file",
-    "vrm": "hands of an avatar go with its own file: give --format gltf and --hand HAND.json",
+    "vrm": "give --format gltf and --hand AVATAR.vrm; the file keeps what is VRM in it, and may be renamed to .vrm",
     "npz": "`manipnet synthesize` writes it",
 }
 """What to do instead, by a format that is not written here."""
+RIG_SUFFIXES: Final = (".glb", ".vrm", ".bvh")
+"""Files of avatars, whose hands can be imported."""
 EXPORT_SUFFIXES: Final = {"gltf": (".glb", ".gltf"), "csv": (".csv",)}
 
 
@@ -232,8 +234,11 @@ class ExportOptions(WritingOptions):
     """gltf: the mesh of an object in metres, a file or an object of the library, if the source does not hold it."""
     actor: Annotated[str | None, _optional("NAME")] = None
     """The actor whose hands to write, if a recording has several; by default the first."""
-    hand: Annotated[Path | None, _optional("HAND.json")] = None
-    """Write the hands of this avatar, with contact solved on them, instead of the model's."""
+    hand: Annotated[Path | None, _optional("HAND|AVATAR")] = None
+    """Write these hands, with contact solved on them: a profile (HAND.json, generic, adult, child), or an avatar (.glb,
+    .vrm, .bvh), whose own mesh and bones are then written in gltf and bvh."""
+    map: Annotated[Path | None, _optional("FILE")] = None
+    """The bone map of an avatar, as for `manipnet hand import`."""
     right_handed: bool = False
     """bvh: write right-handed centimetres, for Blender and Maya, instead of the dataset's left-handed decimetres."""
 
@@ -248,6 +253,11 @@ class ExportOptions(WritingOptions):
             raise ConfigError(already_exists(f"--out {self.out}: a take in BVH files"))
         require_new(self.out, self.force or self.format == "bvh")
         require_hand(self.hand)
+        require_file(self.map)
+        if self.format == "gltf" and self.hand is not None and self.hand.suffix.lower() == ".bvh":
+            raise ConfigError(f"--hand {self.hand}: has no mesh for --format gltf; use bvh, or give the avatar as .glb")
+        if self.map is not None and (self.hand is None or self.hand.suffix.lower() not in RIG_SUFFIXES):
+            raise ConfigError("--map is for an avatar that --hand names; a profile needs no map")
         if self.right_handed and self.format != "bvh":
             raise ConfigError(f"--right-handed is for --format bvh only; {self.format} is always right-handed")
 

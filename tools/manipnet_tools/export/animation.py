@@ -70,6 +70,8 @@ class Animation:
     """The meshes of the objects whose shape is known."""
     timecode: TimecodeTrack | None = None
     """If the tracker sent one."""
+    avatar_joints: dict[Side, Array] = field(default_factory=dict)
+    """The OpenXR joints `(T, 26, 7)` of an avatar's hands, if the source has them; it does not say of which avatar."""
 
 
 def read_animation(path: Path, model: Hand, actor: str | None = None) -> Animation:
@@ -130,7 +132,8 @@ def _read_synthesised(path: Path, model: Hand) -> Animation:
         objects[name] = BodyTrack(arrays["object_poses"][k], seen)
         if f"object_{k}_faces" in arrays:
             meshes[name] = closed_mesh(arrays[f"object_{k}_vertices"], arrays[f"object_{k}_faces"], name)
-    return Animation(path.stem, TICK_HZ, time_s, hands, objects, meshes, timecode_of(arrays))
+    joints = {side: arrays[name] for side in SIDES if (name := f"{side}_hand_joints") in arrays}
+    return Animation(path.stem, TICK_HZ, time_s, hands, objects, meshes, timecode_of(arrays), joints)
 
 
 def _read_recording(path: Path, model: Hand, actor: str | None) -> Animation:

@@ -23,16 +23,26 @@ def write_bvh(animation: Animation, folder: Path, right_handed: bool = False, re
     `right_handed` they are in centimetres, as Blender and Maya expect; no tool here reads those. Raises `ExportError`
     if the folder already contains BVH files, unless they are to be replaced.
     """
-    if not replace and any(folder.glob("*.bvh")):
-        raise ExportError(f"{folder}: already contains BVH files, which may be a take; give a new folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    space = _Space(CENTIMETRES_PER_M, False) if right_handed else _Space(1.0 / DECIMETRE_M, True)
+    new_folder(folder, replace)
+    space = Space(CENTIMETRES_PER_M, False) if right_handed else Space(1.0 / DECIMETRE_M, True)
     texts = {f"{side}Hand": _hand_text(hand, animation.rate_hz, space) for side, hand in animation.hands.items()}
-    for name, body in animation.objects.items():
-        texts[file_stem(name)] = _object_text(file_stem(name), body.poses, animation.rate_hz, space)
+    texts |= object_texts(animation, space)
     for stem, text in texts.items():
         (folder / f"{stem}.bvh").write_text(text, encoding="utf-8")
     return [folder / f"{stem}.bvh" for stem in texts]
+
+
+def new_folder(folder: Path, replace: bool = False) -> None:
+    """Make a folder for files. Raises `ExportError` if it already contains BVH files that are not to be replaced."""
+    if not replace and any(folder.glob("*.bvh")):
+        raise ExportError(f"{folder}: already contains BVH files, which may be a take; give a new folder")
+    folder.mkdir(parents=True, exist_ok=True)
+
+
+def object_texts(animation: Animation, space: "Space") -> dict[str, str]:
+    """The files of the objects, by stem."""
+    stems = {file_stem(name): body for name, body in animation.objects.items()}
+    return {stem: _object_text(stem, body.poses, animation.rate_hz, space) for stem, body in stems.items()}
 
 
 def file_stem(name: str) -> str:
@@ -40,7 +50,7 @@ def file_stem(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)
 
 
-class _Space:
+class Space:
     """The units and handedness of a file."""
 
     def __init__(self, per_m: float, mirrored: bool) -> None:
@@ -48,6 +58,9 @@ class _Space:
 
     def points(self, points: Array) -> Array:
         return self._per_m * (mirror_points(points) if self._mirrored else points)
+
+    def text(self, point: Array) -> str:
+        return _numbers(self.points(point))
 
     def degrees(self, quats: Array) -> Array:
         """Intrinsic Euler angles `(T, ..., 3)` in the order Y, X, Z, unwrapped so that they never jump by 360°."""
@@ -58,11 +71,11 @@ class _Space:
         return np.unwrap(angles.reshape(*quats.shape[:-1], 3), period=360.0, axis=0)
 
 
-def _hand_text(hand: HandTrack, rate_hz: float, space: _Space) -> str:
+def _hand_text(hand: HandTrack, rate_hz: float, space: Space) -> str:
     offsets = space.points(hand.offsets)
     columns = [space.points(hand.wrist[:, :3]), space.degrees(hand.rotations).reshape(len(hand.wrist), -1)]
     return "\n".join(
-        ["HIERARCHY", *_joint(hand.model, 0, offsets, ""), *_motion(np.concatenate(columns, axis=1), rate_hz)]
+        ["HIERARCHY", *_joint(hand.model, 0, offsets, ""), *motion_lines(np.concatenate(columns, axis=1), rate_hz)]
     )
 
 
@@ -82,14 +95,15 @@ def _joint(model: Hand, joint: int, offsets: Array, indent: str) -> list[str]:
     return [head, f"{indent}{{", f"{indent}\tOFFSET {_numbers(offsets[joint])}", *channels, *below, f"{indent}}}"]
 
 
-def _object_text(name: str, poses: Array, rate_hz: float, space: _Space) -> str:
+def _object_text(name: str, poses: Array, rate_hz: float, space: Space) -> str:
     end = ["\tEnd Site", "\t{", "\t\tOFFSET 0 0 0", "\t}"]
     columns = np.concatenate([space.points(poses[:, :3]), space.degrees(poses[:, 3:])], axis=1)
     head = ["HIERARCHY", f"ROOT {name}", "{", "\tOFFSET 0 0 0", f"\t{_ROOT_CHANNELS}", *end, "}"]
-    return "\n".join([*head, *_motion(columns, rate_hz)])
+    return "\n".join([*head, *motion_lines(columns, rate_hz)])
 
 
-def _motion(columns: Array, rate_hz: float) -> list[str]:
+def motion_lines(columns: Array, rate_hz: float) -> list[str]:
+    """The motion section of a file whose channels are `columns (T, C)`."""
     rows = [_numbers(row) for row in columns]
     return ["MOTION", f"Frames: {len(rows)}", f"Frame Time: {1.0 / rate_hz:.9f}", *rows, ""]
 

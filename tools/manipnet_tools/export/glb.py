@@ -23,10 +23,13 @@ _TYPES: Final = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4):
 class Buffer:
     """Arrays that are packed one after the other, each with its buffer view and its accessor."""
 
-    def __init__(self) -> None:
-        self._bytes = bytearray()
-        self._views: list[dict[str, Any]] = []
-        self._accessors: list[dict[str, Any]] = []
+    def __init__(self, document: dict[str, Any] | None = None, content: bytes = b"") -> None:
+        """An empty buffer, or the first one of a document, whose arrays keep their places."""
+        document = document or {}
+        self._bytes = bytearray(content + bytes(-len(content) % 4))
+        self._views: list[dict[str, Any]] = list(document.get("bufferViews", []))
+        self._accessors: list[dict[str, Any]] = list(document.get("accessors", []))
+        self._others: list[dict[str, Any]] = list(document.get("buffers", []))[1:]
 
     def add(self, values: NDArray[Any], target: int | None = None, bounds: bool = False) -> int:
         """Append an array, and return the index of its accessor.
@@ -54,7 +57,11 @@ class Buffer:
         buffer: dict[str, Any] = {"byteLength": len(content)}
         if path.suffix.lower() == ".gltf":
             buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(content).decode()
-        document = document | {"accessors": self._accessors, "bufferViews": self._views, "buffers": [buffer]}
+        document = document | {
+            "accessors": self._accessors,
+            "bufferViews": self._views,
+            "buffers": [buffer, *self._others],
+        }
         text = json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
         path.write_bytes(text if "uri" in buffer else _glb(text, content))
 

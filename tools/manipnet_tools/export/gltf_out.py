@@ -1,9 +1,10 @@
 """Writes hands and objects as glTF 2.0: hands as skinned meshes with skeletons, objects as meshes, and one animation.
 
 Coordinates are right-handed, Y up, in metres, as glTF requires. Time starts at the first frame. The skin is that of the
-model's hand.
+model's hand, or the file is that of an avatar, whose own bones move.
 """
 
+import copy
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.objects.mesh import ClosedMesh
 from manipnet.wire import Side
 from manipnet_tools.export.animation import Animation, HandTrack
+from manipnet_tools.export.avatar_gltf import local_motion, place_for_animation
+from manipnet_tools.export.avatar_motion import AvatarMotion
 from manipnet_tools.export.glb import ATTRIBUTE, INDEX, Buffer
 from manipnet_tools.rendering import CERAMIC, SKIN_LEFT, SKIN_RIGHT, corner_normals
 from manipnet_tools.takes.timecode_track import TimecodeTrack
@@ -25,10 +28,12 @@ from manipnet_tools.takes.timecode_track import TimecodeTrack
 _COLOURS: Mapping[Side, tuple[float, float, float]] = {"left": SKIN_LEFT, "right": SKIN_RIGHT}
 
 
-def write_gltf(animation: Animation, path: Path) -> None:
-    """Write `.glb` or `.gltf`. Raises `OSError`."""
-    scene = _Document(animation)
-    for side, hand in animation.hands.items():
+def write_gltf(animation: Animation, path: Path, avatar: AvatarMotion | None = None) -> None:
+    """Write `.glb` or `.gltf`; with an avatar, its own file with its bones in motion. Raises `OSError`."""
+    scene = _Document(animation, {}, b"") if avatar is None else _Document(animation, *avatar.rig.skeleton.document)
+    if avatar is not None:
+        scene.move_bones(avatar)
+    for side, hand in animation.hands.items() if avatar is None else ():
         scene.add_hand(side, hand)
     for name, body in animation.objects.items():
         scene.add_object(name, body.poses, animation.meshes.get(name))
@@ -36,12 +41,14 @@ def write_gltf(animation: Animation, path: Path) -> None:
 
 
 class _Document:
-    """A document that grows node by node."""
+    """A document that grows node by node, from nothing or from the document of an avatar."""
 
-    def __init__(self, animation: Animation) -> None:
-        self._buffer = Buffer()
-        self._document: dict[str, list[Any]] = {"nodes": [], "meshes": [], "materials": []}
-        self._skins: list[Any] = []
+    def __init__(self, animation: Animation, document: dict[str, Any], binary: bytes) -> None:
+        self._buffer = Buffer(document, binary)
+        self._before = copy.deepcopy(document)
+        parts = ("nodes", "meshes", "materials", "skins")
+        self._document: dict[str, list[Any]] = {part: self._before.pop(part, []) for part in parts}
+        self._skins = self._document.pop("skins")
         self._roots: list[int] = []
         self._channels: list[dict[str, Any]] = []
         self._samplers: list[dict[str, Any]] = []
@@ -67,6 +74,14 @@ class _Document:
         self._document["nodes"][body]["skin"] = len(self._skins) - 1
         self._roots += [first, body]
 
+    def move_bones(self, avatar: AvatarMotion) -> None:
+        """Animate the bones of the hands in the document of an avatar."""
+        document, parents = avatar.rig.skeleton.document[0], avatar.rig.skeleton.parents
+        for bone, moved in avatar.bones.items():
+            place_for_animation(self._document["nodes"][bone])
+            positions, quats = local_motion(document, parents, bone, moved)
+            self._animate(bone, positions if moved.is_hand else None, quats)
+
     def add_object(self, name: str, poses: Array, mesh: ClosedMesh | None) -> None:
         """Add a moving mesh, or only a moving node if the shape of the object is not known."""
         index = None
@@ -79,11 +94,16 @@ class _Document:
 
     def save(self, path: Path) -> None:
         """Write the document."""
+        before = self._before
         optional = {key: value for key, value in (self._document | {"skins": self._skins}).items() if value}
         animation = {"name": self._name, "channels": self._channels, "samplers": self._samplers, **self._timecode}
-        asset = {"version": "2.0", "generator": f"ManipNet Live {__version__}"}
-        scenes = [{"name": self._name, "nodes": self._roots}]
-        self._buffer.save(path, {"asset": asset, "scene": 0, "scenes": scenes, "animations": [animation], **optional})
+        asset = before.pop("asset", {}) | {"version": "2.0", "generator": f"ManipNet Live {__version__}"}
+        scenes = before.pop("scenes", [{"name": self._name, "nodes": []}])
+        shown = scenes[before.pop("scene", 0)]
+        shown["nodes"] = shown.get("nodes", []) + self._roots
+        animations = [animation, *before.pop("animations", [])]
+        first = {"asset": asset, "scene": scenes.index(shown), "scenes": scenes, "animations": animations}
+        self._buffer.save(path, first | before | optional)
 
     def _node(self, name: str, offset: Array | None, mesh: int | None, children: list[int]) -> int:
         node: dict[str, Any] = {"name": name}

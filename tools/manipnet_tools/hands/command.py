@@ -1,7 +1,6 @@
 """`manipnet hand`: makes, draws and checks the hand profile of an avatar."""
 
 import argparse
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -69,9 +68,9 @@ def _import(options: argparse.Namespace) -> None:
         require_new(file, options.force)
     from manipnet.synthesis.hand.profile import profile_to_json
     from manipnet.synthesis.model.shipped import shipped_hand
-    from manipnet_tools.hands.importing import import_profile
+    from manipnet_tools.hands.importing import import_profile, profile_name
 
-    name = options.name or re.sub(r"[\s/]+", "-", options.avatar.stem)
+    name = options.name or profile_name(options.avatar)
     profile = import_profile(options.avatar, name, shipped_hand(), print, options.map)
     options.out.write_text(profile_to_json(profile), encoding="utf-8")
     print(f"wrote {options.out}")

@@ -1,6 +1,7 @@
 """From a rig to a hand profile: the 26 OpenXR joints at rest with straight fingers, and radii from the skin."""
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,6 +64,11 @@ def import_rig(
     }
     profile = parse_profile(json.loads(profile_to_json(HandProfile(name, described))))
     return ImportedRig(profile, skeleton, unit, hands)
+
+
+def profile_name(avatar: Path) -> str:
+    """The name of an avatar's profile: that of its file without spaces and slashes."""
+    return re.sub(r"[\s/]+", "-", avatar.stem)
 
 
 def _unit(skeleton: Skeleton, maps: dict[Side, BoneMap], say: Callable[[str], None]) -> float:

@@ -2,17 +2,16 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from manipnet.geometry import Array
-from manipnet.synthesis.objects.glb import read_glb_rig
+from manipnet.synthesis.objects.glb import glb_chunks, read_glb_rig
 from manipnet.synthesis.objects.glb_accessors import GlbError
-from manipnet_tools.takes.bvh_motion import BvhError, read_bvh
-
-SUFFIXES: Final = (".glb", ".vrm", ".bvh")
+from manipnet_tools.commands.options import RIG_SUFFIXES
+from manipnet_tools.takes.bvh_motion import BvhError, Joint, read_bvh
 
 
 class RigFileError(ValueError):
@@ -39,6 +38,10 @@ class Skeleton:
     """`(V, 4)` how much each of them moves it."""
     in_metres: bool
     """Whether the format has metres as its unit."""
+    document: tuple[dict[str, Any], bytes] = ({}, b"")
+    """The JSON document and the binary chunk of a glTF file; its bones have the numbers of the nodes."""
+    joints: tuple[Joint, ...] = ()
+    """The joints of a BVH file."""
 
     def main_owners(self) -> NDArray[np.int64]:
         """The bone that moves each vertex most, `(V,)`."""
@@ -53,8 +56,8 @@ class Skeleton:
 def read_skeleton(path: Path) -> Skeleton:
     """Read a rig. Raises `RigFileError`."""
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise RigFileError(f"{path}: must end in {', '.join(SUFFIXES)}; export the avatar as glTF Binary (.glb)")
+    if suffix not in RIG_SUFFIXES:
+        raise RigFileError(f"{path}: must end in {', '.join(RIG_SUFFIXES)}; export the avatar as glTF Binary (.glb)")
     try:
         return _from_bvh(path) if suffix == ".bvh" else _from_glb(path)
     except GlbError as error:
@@ -66,9 +69,10 @@ def read_skeleton(path: Path) -> Skeleton:
 
 
 def _from_glb(path: Path) -> Skeleton:
-    rig = read_glb_rig(path.read_bytes())
+    data = path.read_bytes()
+    rig = read_glb_rig(data)
     skin = rig.vertices, rig.faces, rig.owners, rig.weights
-    return Skeleton(rig.names, rig.parents, rig.positions, {}, *skin, in_metres=True)
+    return Skeleton(rig.names, rig.parents, rig.positions, {}, *skin, in_metres=True, document=glb_chunks(data))
 
 
 def _from_bvh(path: Path) -> Skeleton:
@@ -79,4 +83,4 @@ def _from_bvh(path: Path) -> Skeleton:
     ends = {k: heads[k] + np.array(joint.end) for k, joint in enumerate(joints) if joint.end is not None}
     no_skin = np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 4), np.int64), np.empty((0, 4))
     names, parents = [joint.name for joint in joints], [joint.parent for joint in joints]
-    return Skeleton(names, parents, heads, ends, *no_skin, in_metres=False)
+    return Skeleton(names, parents, heads, ends, *no_skin, in_metres=False, joints=joints)

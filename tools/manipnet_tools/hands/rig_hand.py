@@ -245,7 +245,7 @@ class _RigHand:
         length = float(np.linalg.norm(along))
         own = self._skin[self._owners == bone] - start
         at = own @ along / max(length, 1e-9) ** 2
-        middle = (own - at[:, None] * along)[(at > 0.1) & (at < 0.9)]
+        middle = (own - at[:, None] * along)[(at > 0.3) & (at < 0.9)]
         away = np.linalg.norm(middle, axis=1)
         facing = middle @ palmar > PALMAR * away
         if len(middle) < 6 or not facing.any():

@@ -70,7 +70,9 @@ func _add_finger(fingers, finger, to_hand):
 		if along == null:
 			continue
 		var wanted = -(_align * Rotations.from_quaternion(_model_rest[JOINTS[number]], 3)).z
-		var parent = to_hand * _rest_in_skeleton(_skeleton.get_bone_parent(bone))
+		var parent = to_hand
+		if _skeleton.get_bone_parent(bone) >= 0:
+			parent = to_hand * _rest_in_skeleton(_skeleton.get_bone_parent(bone))
 		_bones.append({
 			"bone": bone,
 			"joint": JOINTS[number],

@@ -71,17 +71,20 @@ class WebSocketPublisher(HandsOutput):
 
     def send(self, hands: EncodedHands) -> bool:
         """Offer one message to every client."""
-        return self.publish(hands.binary)
+        return self._has_clients(None) and self.publish(hands.binary)
 
     def wants(self, avatar: str) -> bool:
         """Whether a client is connected at the path of the avatar. From any thread."""
-        return any(client.avatar == avatar for client in self._clients)
+        return self._has_clients(avatar)
 
     def send_avatar(self, hands: EncodedHands, profile: HandProfile) -> bool:
         """Offer the hands of an avatar to the clients at its path."""
         if self.wants(profile.name):
             self.publish(hands.binary, profile.name)
         return False
+
+    def _has_clients(self, avatar: str | None) -> bool:
+        return any(client.avatar == avatar for client in self._clients)
 
     def publish(self, payload: bytes, avatar: str | None = None) -> bool:
         """Offer one payload to the clients at the path of an avatar, or without one to those of the model's hand.

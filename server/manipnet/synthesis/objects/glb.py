@@ -34,7 +34,7 @@ _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices `(V, 3)` in metres and triangles `(F, 3)`. Raises `GlbError`."""
-    document, binary = _chunks(data)
+    document, binary = glb_chunks(data)
     try:
         _check_extensions(document)
         with np.errstate(all="ignore"):  # numbers that are not finite are refused when the mesh is checked
@@ -45,8 +45,8 @@ def read_glb(data: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         raise GlbError(f"is a damaged glTF file ({type(error).__name__}: {error}); export it again") from None
 
 
-def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """The JSON document and the binary chunk."""
+def glb_chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
+    """The JSON document and the binary chunk of a glTF Binary file. Raises `GlbError`."""
     if data[:4] != b"glTF":
         hint = "; it is a .gltf file: export it as glTF Binary (.glb)" if data.lstrip()[:1] == b"{" else ""
         raise GlbError(f"is not a glTF Binary file: it does not begin with glTF{hint or '; export it again'}")
@@ -102,13 +102,19 @@ class GlbRig:
 
 def read_glb_rig(data: bytes) -> GlbRig:
     """The skeleton of a glTF Binary or VRM file. Raises `GlbError`."""
-    document, binary = _chunks(data)
+    document, binary = glb_chunks(data)
     try:
         return _Scene(document, binary).rig()
     except GlbError:
         raise
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
         raise GlbError(f"is a damaged glTF file ({type(error).__name__}: {error}); export it again") from None
+
+
+def node_matrices(document: dict[str, Any]) -> NDArray[np.float64]:
+    """The matrices `(N, 4, 4)` from the nodes of a document to its scene. Raises `GlbError`."""
+    scene = _Scene(document, b"")
+    return np.array([scene.world(n) for n in range(len(document.get("nodes", [])))]).reshape(-1, 4, 4)
 
 
 def _humanoid_names(document: dict[str, Any]) -> dict[int, str]:
@@ -151,7 +157,7 @@ class _Scene:
         """The nodes and the skinned vertices."""
         humanoid = _humanoid_names(self._document)
         names = [humanoid.get(n, str(node.get("name", n))) for n, node in enumerate(self._nodes)]
-        positions = np.array([self._world(n)[:3, 3] for n in range(len(self._nodes))]).reshape(-1, 3)
+        positions = np.array([self.world(n)[:3, 3] for n in range(len(self._nodes))]).reshape(-1, 3)
         vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int64)]
         owners, weights, total = [np.empty((0, 4), np.int64)], [np.empty((0, 4))], 0
         for n, node in enumerate(self._nodes):
@@ -225,7 +231,7 @@ class _Scene:
 
     def _instances(self, node: int) -> list[NDArray]:
         """The world matrices of a node's copies."""
-        world = self._world(node)
+        world = self.world(node)
         attributes = _extension(self._nodes[node], "EXT_mesh_gpu_instancing").get("attributes")
         if not attributes:
             return [world]
@@ -239,7 +245,7 @@ class _Scene:
             raise GlbError(f"has {count} copies of one mesh; at most {MAX_INSTANCES} are allowed")
         return [world @ _matrix(**{name.lower(): values[i] for name, values in parts.items()}) for i in range(count)]
 
-    def _world(self, node: int) -> NDArray:
+    def world(self, node: int) -> NDArray:
         """The matrix from a node to the scene."""
         matrix, passed = np.eye(4), 0
         at: int | None = node
@@ -258,7 +264,7 @@ class _Scene:
     def _skinned(self, points: NDArray, attributes: dict[str, int], skin: int) -> NDArray:
         """Vertices as the joints of a skin place them in the pose of the file."""
         joints = self._document["skins"][skin]["joints"]
-        matrices = np.stack([self._world(joint) for joint in joints])
+        matrices = np.stack([self.world(joint) for joint in joints])
         if (inverse := self._document["skins"][skin].get("inverseBindMatrices")) is not None:
             matrices = matrices @ self._accessors.read(inverse, 16)[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
         ones = np.concatenate([points, np.ones((len(points), 1))], axis=1)
