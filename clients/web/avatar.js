@@ -60,6 +60,7 @@ class AvatarHand {
   #arm;
   #bones;
   #bind = [];
+  #loose = []; // bones of rigs without a hierarchy, whose places are set too, as in WebXR's generic hand
   #toWrist; // from the frame of the wrist joint to the space of the hand bone
   #joints = Array(JOINT_COUNT).fill(null);
   #radii = Array(JOINT_COUNT).fill(null);
@@ -83,6 +84,16 @@ class AvatarHand {
       this.#addFinger(finger, points, skin, tip && inWrist(placeOf(tip)), toHand);
     }
     this.#addPalm(metacarpals.map((bone) => bone && inWrist(placeOf(nodes.get(bone)))));
+    const others = [...metacarpals.map((bone, k) => [bone, FIRST_JOINTS[k + 1] - 1]), ...tips.map((bone, k) => [bone, TIP_JOINTS[k]])];
+    const all = [...fingers.map((bone, row) => [bone, JOINTS[row]]), ...others];
+    for (const [name, joint] of all) {
+      const node = name === null ? null : nodes.get(name);
+      if (node === null || this.#joints[joint] === null || isBelow(node, this.#hand)) continue;
+      const row = JOINTS.indexOf(joint);
+      const rest = multiply(conjugate(this.#toWrist), multiply(toHand, worldRotation(node)));
+      const bind = row >= 0 ? this.#bind[row] : multiply(conjugate(this.#joints[joint].slice(3)), rest);
+      this.#loose.push({ node, joint, bind });
+    }
   }
 
   content() {
@@ -103,6 +114,20 @@ class AvatarHand {
       const world = multiply(turned, multiply(joint(JOINTS[row]), this.#bind[row]));
       bone.quaternion.fromArray(multiply(conjugate(worldRotation(bone.parent, driven)), world)).normalize();
       driven.set(bone, world);
+    }
+    if (this.#loose.length > 0) this.#placeLoose(joints, turned);
+  }
+
+  #placeLoose(joints, turned) {
+    this.#hand.updateWorldMatrix(true, false);
+    const at = placeOf(this.#hand);
+    const place = (number) => Array.from(joints.subarray(7 * number, 7 * number + 3));
+    const wrist = place(WRIST);
+    for (const { node, joint, bind } of this.#loose) {
+      const rotation = Array.from(joints.subarray(7 * joint + 3, 7 * joint + 7));
+      const world = multiply(turned, multiply(rotation, bind));
+      node.parent.worldToLocal(node.position.fromArray(add(at, rotate(turned, sub(place(joint), wrist)))));
+      node.quaternion.fromArray(multiply(conjugate(worldRotation(node.parent)), world)).normalize();
     }
   }
 
@@ -257,6 +282,11 @@ function skinOf(root, bones) {
 /** A point, transformed by the elements of a three.js matrix, which go down its columns. */
 function transform(e, [x, y, z]) {
   return [0, 1, 2].map((i) => e[i] * x + e[4 + i] * y + e[8 + i] * z + e[12 + i]);
+}
+
+function isBelow(node, above) {
+  for (let each = node; each; each = each.parent) if (each === above) return true;
+  return false;
 }
 
 function placeOf(node) {
