@@ -42,6 +42,8 @@ class Grasp:
     """`(3,)` the direction in which the hand arrives."""
     touching: Array
     """`(C,)` the capsules that touch."""
+    downs: Array
+    """`(n, 3)` the directions of gravity in which it holds."""
 
 
 def find_grasp(tables: Tables, space: Space, proposal: Proposal, centre: Array, refused: Counter[str]) -> Grasp | None:
@@ -154,9 +156,9 @@ def _settled(
     if not all(digits[f] for f in proposal.needed):
         return None, "a needed digit does not touch"
     on_surface = points[touching] - normals[touching] * (gaps + hand.radii)[touching, None]
-    if not carried(cone_columns(on_surface, normals[touching], centre)).all():
+    if not carried(cone_columns(on_surface, normals[touching], centre), proposal.downs).all():
         return None, "does not carry the object"
-    return Grasp(proposal.kind, turned, moved, posed, proposal.along, touching), ""
+    return Grasp(proposal.kind, turned, moved, posed, proposal.along, touching, proposal.downs), ""
 
 
 def _rotation(vector: Array) -> Array:

@@ -14,6 +14,7 @@ from numpy.random import Generator
 from manipnet.geometry import Array
 from manipnet.synthesis.objects.shape import Shape
 from manipnet_tools.generate.finger_tables import Tables
+from manipnet_tools.generate.forces import SIDES
 from manipnet_tools.generate.solids import Site
 
 PAIRS: Final = 120_000
@@ -22,7 +23,8 @@ WIDTH_STEP_M: Final = 0.005
 WIDEST_PINCH_M: Final = 0.085
 FACING: Final = 0.75
 """Cosine between a pad and the line to the other one."""
-_POWER, _PRECISE, _HOOK = (0.6, 1.0, 1.2), (0.0, 0.15, 2.0), (0.8, 1.2, 1.0)
+CONE_RAD: Final = np.radians(30.0)
+_POWER, _PRECISE, _HOOK, _FLAT = (0.6, 1.0, 1.2), (0.0, 0.15, 2.0), (0.8, 1.2, 1.0), (0.5, 0.5, 0.6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +41,8 @@ class Proposal:
     wanted: Array
     needed: tuple[int, ...]
     along: Array
+    downs: Array
+    """`(n, 3)` the directions of gravity in which it has to hold: all, or about one for a hook or a flat hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,15 +103,15 @@ def propose(
 def kinds_for(sites: Sequence[Site]) -> tuple[str, ...]:
     """Types of grasps worth trying, those that are tried more often more than once."""
     held = {site.kind for site in sites}
-    kinds: list[str] = ["palm", "palm", "above", "pinch", "tripod"]
+    kinds: list[str] = ["palm", "palm", "palm", "above", "above", "pinch", "pinch", "tripod", "tripod", "flat"]
     if "bar" in held:
-        kinds += ["bar"] * 5 + ["hook"] * 4
+        kinds += ["bar"] * 10 + ["hook"] * 8
     if "stick" in held:
-        kinds += ["bar"] * 5 + ["tripod"]
+        kinds += ["bar"] * 10 + ["tripod"] * 2
     if "rim" in held:
-        kinds += ["pinch", "tripod", "lateral"]
+        kinds += ["pinch", "tripod", "lateral"] * 2
     if "knob" in held:
-        kinds += ["tripod", "pinch", "above"]
+        kinds += ["tripod", "pinch", "above"] * 4
     return tuple(kinds)
 
 
@@ -136,7 +140,9 @@ def _around(tables: Tables, site: Site, kind: str, rng: Generator) -> Proposal:
     place = site.point - turn @ np.array(at)
     thumb = _POWER if not hooked or rng.random() < 0.5 else (0.0, 0.5, 0.8)
     wanted = np.array([thumb, *[_HOOK if hooked else _POWER] * 4])
-    return Proposal(kind, turn, place, wanted, (1, 2), -turn[:, 2])
+    upright = hooked or (site.kind == "bar" and rng.random() < 0.7)
+    down = turn[:, 0] if hooked else np.array([0.0, -1.0, 0.0])
+    return Proposal(kind, turn, place, wanted, (1, 2), -turn[:, 2], cone(down) if upright else SIDES)
 
 
 def _pinched(pinches: Pinches, held: tuple[Array, Array, Array, float], kind: str, rng: Generator) -> Proposal | None:
@@ -160,7 +166,7 @@ def _pinched(pinches: Pinches, held: tuple[Array, Array, Array, float], kind: st
         if rng.random() < 0.4:
             wanted[3:] = _PRECISE
     needed = (0, 1, 2) if kind == "tripod" else (0, 1)
-    return Proposal(kind, turn, place, wanted, needed, frame[:, 0])
+    return Proposal(kind, turn, place, wanted, needed, frame[:, 0], SIDES)
 
 
 def _on_surface(tables: Tables, shape: Shape, kind: str, rng: Generator) -> Proposal:
@@ -173,10 +179,24 @@ def _on_surface(tables: Tables, shape: Shape, kind: str, rng: Generator) -> Prop
     y /= np.linalg.norm(y)
     turn = np.stack([np.cross(y, z), y, z], axis=1)
     knuckle, palm = hand.offsets[8], hand.radii[1]
-    off = rng.uniform(0.02, 0.05) if kind == "above" else rng.uniform(-0.001, 0.012)
-    at = np.array([rng.uniform(0.065, 0.1) + (0.025 if kind == "above" else 0.0), rng.uniform(-0.02, 0.015), knuckle[2] - palm - off])
-    row = _PRECISE if kind == "above" else _POWER
-    return Proposal(kind, turn, point - turn @ at, np.array([row] * 5), (0, 1, 2), -z)
+    off = {"above": rng.uniform(0.02, 0.05), "palm": rng.uniform(-0.001, 0.012), "flat": rng.uniform(-0.001, 0.002)}[kind]
+    reach = rng.uniform(0.065, 0.1) + (0.025 if kind == "above" else 0.0)
+    at = np.array([reach, rng.uniform(-0.02, 0.015), knuckle[2] - palm - off])
+    row = {"above": _PRECISE, "palm": _POWER, "flat": _FLAT}[kind]
+    wanted = np.array([row] * 5) * (1.0 if kind != "flat" else np.array([0.3, 1, 1, 1, 1])[:, None])
+    flat = kind == "flat"
+    downs = cone(turn[:, 2]) if flat else SIDES
+    return Proposal(kind, turn, point - turn @ at, wanted, () if flat else (0, 1, 2), -z, downs)
+
+
+def cone(down: Array) -> Array:
+    """The direction `down (3,)` and four that lean away from it by `CONE_RAD`, `(5, 3)`."""
+    down = down / np.linalg.norm(down)
+    u = np.cross(down, np.eye(3)[int(np.argmin(np.abs(down)))])
+    u /= np.linalg.norm(u)
+    v = np.cross(down, u)
+    aside = np.sin(CONE_RAD) * np.array([u, -u, v, -v])
+    return np.concatenate([down[None], np.cos(CONE_RAD) * down + aside])
 
 
 def _edge(site: Site, rng: Generator) -> tuple[Array, Array, Array, float]:
