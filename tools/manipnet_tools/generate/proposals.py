@@ -12,9 +12,9 @@ import numpy as np
 from numpy.random import Generator
 
 from manipnet.geometry import Array
-from manipnet.synthesis.objects.shape import Shape
 from manipnet_tools.generate.finger_tables import Tables
 from manipnet_tools.generate.forces import SIDES
+from manipnet_tools.generate.mirrored import Surface
 from manipnet_tools.generate.solids import Site
 
 PAIRS: Final = 120_000
@@ -83,9 +83,18 @@ def pinches_of(tables: Tables, lateral: bool, rng: Generator) -> Pinches:
 
 
 def propose(
-    tables: Tables, pinches: tuple[Pinches, Pinches], shape: Shape, sites: Sequence[Site], kinds: Sequence[str], rng: Generator
+    tables: Tables,
+    pinches: tuple[Pinches, Pinches],
+    shape: Surface,
+    corners: Array,
+    sites: Sequence[Site],
+    kinds: Sequence[str],
+    rng: Generator,
 ) -> Proposal | None:
-    """One pose of a random type, or nothing where the drawn place does not suit it."""
+    """One pose of a random type, or nothing where the drawn place does not suit it.
+
+    `corners (F, 3, 3)` are the triangles of the shape, and `pinches` those of the pads and of the finger's side.
+    """
     kind = kinds[int(rng.integers(len(kinds)))]
     bars = [site for site in sites if site.kind in ("bar", "stick")]
     edges = [site for site in sites if site.kind in ("rim", "knob", "stick")]
@@ -95,9 +104,9 @@ def propose(
         if edges and rng.random() < (1.0 if kind == "lateral" else 0.7):
             held = _edge(_drawn(edges, rng), rng)
         else:
-            held = _opposite_points(shape, rng)
+            held = _opposite_points(shape, corners, rng)
         return None if held is None else _pinched(pinches[kind == "lateral"], held, kind, rng)
-    return _on_surface(tables, shape, kind, rng)
+    return _on_surface(tables, corners, kind, rng)
 
 
 def kinds_for(sites: Sequence[Site]) -> tuple[str, ...]:
@@ -169,10 +178,10 @@ def _pinched(pinches: Pinches, held: tuple[Array, Array, Array, float], kind: st
     return Proposal(kind, turn, place, wanted, needed, frame[:, 0], SIDES)
 
 
-def _on_surface(tables: Tables, shape: Shape, kind: str, rng: Generator) -> Proposal:
+def _on_surface(tables: Tables, corners: Array, kind: str, rng: Generator) -> Proposal:
     """The palm on or above the surface: closing around a body, or with all tips around it."""
     hand = tables.hand
-    point, normal = _surface_point(shape, rng)
+    point, normal = _surface_point(corners, rng)
     z = normal + 0.25 * rng.normal(size=3)
     z /= np.linalg.norm(z)
     y = np.cross(z, rng.normal(size=3))
@@ -209,9 +218,9 @@ def _edge(site: Site, rng: Generator) -> tuple[Array, Array, Array, float]:
     return site.point, line, toward, 2.0 * site.radius
 
 
-def _opposite_points(shape: Shape, rng: Generator) -> tuple[Array, Array, Array, float] | None:
+def _opposite_points(shape: Surface, corners: Array, rng: Generator) -> tuple[Array, Array, Array, float] | None:
     """Two places on the surface that look away from each other."""
-    point, normal = _surface_point(shape, rng)
+    point, normal = _surface_point(corners, rng)
     inward = -normal + 0.1 * rng.normal(size=3)
     inward /= np.linalg.norm(inward)
     width = float(shape.trace((point + 1e-4 * inward)[None], inward[None])[0])
@@ -226,8 +235,7 @@ def _opposite_points(shape: Shape, rng: Generator) -> tuple[Array, Array, Array,
     return middle, inward, toward, width
 
 
-def _surface_point(shape: Shape, rng: Generator) -> tuple[Array, Array]:
-    corners = shape.mesh.vertices[shape.mesh.faces]
+def _surface_point(corners: Array, rng: Generator) -> tuple[Array, Array]:
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1)
     face = int(np.searchsorted(np.cumsum(area), rng.random() * area.sum()))

@@ -14,11 +14,11 @@ import numpy as np
 from manipnet.geometry import Array, matrix_to_quat
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.objects.shape import Shape
 from manipnet_tools.generate.contact import PALM_START, Space, look
 from manipnet_tools.generate.finger_tables import Tables
 from manipnet_tools.generate.forces import squeeze
 from manipnet_tools.generate.grasps import TOUCH_M, Grasp
+from manipnet_tools.generate.mirrored import Surface
 
 OBJECT_KG: Final = 0.2
 FRICTION: Final = 0.8
@@ -37,7 +37,7 @@ _HAND_BIT, _OBJECT_BIT = 1, 2
 class Shaker:
     """Tries grasps of one object by one hand."""
 
-    def __init__(self, tables: Tables, shape: Shape, pieces: Sequence[Array]) -> None:
+    def __init__(self, tables: Tables, shape: Surface, pieces: Sequence[Array]) -> None:
         self._tables = tables
         self._shape = shape
         self._model = _model(tables.hand, shape, pieces)
@@ -98,7 +98,7 @@ class Shaker:
         return float(np.linalg.norm(centre[1] - centre[0])), turned
 
 
-def _model(hand: Hand, shape: Shape, pieces: Sequence[Array]) -> mujoco.MjModel:
+def _model(hand: Hand, shape: Surface, pieces: Sequence[Array]) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.compiler.autolimits = True
     spec.compiler.degree = False
@@ -143,7 +143,7 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
         servo.biasprm[1] = -SERVO_NM_RAD
 
 
-def _add_object(spec: mujoco.MjSpec, shape: Shape, pieces: Sequence[Array]) -> None:
+def _add_object(spec: mujoco.MjSpec, shape: Surface, pieces: Sequence[Array]) -> None:
     inertia = OBJECT_KG * shape.inertia
     upper = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     body = spec.worldbody.add_body(
