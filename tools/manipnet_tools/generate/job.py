@@ -73,7 +73,7 @@ def make_take(number: int, seed: int) -> MadeTake:
     grasped_s = time.process_time() - started
     director = Director(bank.grasps, made.mesh.vertices, rng)
     scene = director.direct(TAKE_S)
-    obj, wrists, angles = play(scene, tables.hand.limits, rng)
+    obj, wrists, angles = play(scene, tables.hand.limits, shape, rng)
     notes: dict[str, Any] = {
         "shape": made.kind,
         "events": director.events,

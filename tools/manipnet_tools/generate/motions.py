@@ -13,13 +13,29 @@ from typing import Final
 import numpy as np
 from numpy.random import Generator
 
-from manipnet.geometry import SIDES, Array, Side, compose, matrix_to_quat, mirror_poses, quat_exp, quat_multiply, quat_slerp
+from manipnet.geometry import (
+    SIDES,
+    Array,
+    Side,
+    compose,
+    invert,
+    matrix_to_quat,
+    mirror_poses,
+    quat_exp,
+    quat_multiply,
+    quat_rotate,
+    quat_slerp,
+    transform,
+)
+from manipnet.synthesis.objects.shape import Shape
 from manipnet_tools.assets.minimum_jerk import Move, ease, superpose
 from manipnet_tools.generate.finger_tables import RELAXED
 
 RATE_HZ: Final = 120.0
 _DRIFT_M, _DRIFT_RAD = 0.0008, 0.006
-_FREE_LIFE_RAD, _HELD_LIFE_RAD = np.radians(4.0), np.radians(1.0)
+_FREE_LIFE_RAD, _HELD_LIFE_RAD = np.radians(7.0), np.radians(2.2)
+_CLEAR_M: Final = 0.12
+"""A hand that does not hold keeps its palm this far from the object."""
 _LIFE_HZ: Final = (0.4, 0.9, 1.8, 3.2, 5.0)
 
 
@@ -53,7 +69,9 @@ class Scene:
     holds: Sequence[Hold] = field(default_factory=tuple)
 
 
-def play(scene: Scene, limits: Array, rng: Generator) -> tuple[Array, dict[Side, Array], dict[Side, Array]]:
+def play(
+    scene: Scene, limits: Array, shape: Shape, rng: Generator
+) -> tuple[Array, dict[Side, Array], dict[Side, Array]]:
     """Poses of the object `(T, 7)`, and of each hand's wrist `(T, 7)` and angles `(T, A)`, at `RATE_HZ`."""
     time_s = np.arange(int(scene.length_s * RATE_HZ)) / RATE_HZ
     obj = superpose(time_s, scene.start, scene.moves)
@@ -67,13 +85,14 @@ def play(scene: Scene, limits: Array, rng: Generator) -> tuple[Array, dict[Side,
     angles: dict[Side, Array] = {}
     for side in SIDES:
         own = [hold for hold in scene.holds if hold.side == side]
-        wrists[side] = _wrist(time_s, obj, own, side, rng)
+        wrists[side] = _wrist(time_s, obj, own, side, shape, rng)
         angles[side] = _fingers(time_s, own, limits, rng)
     return obj, wrists, angles
 
 
-def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, rng: Generator) -> Array:
-    pose = _at_home(time_s, side, rng)
+def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, shape: Shape, rng: Generator) -> Array:
+    pose = _outside(_at_home(time_s, side, rng), obj, side, shape, np.ones(len(time_s)))
+    arriving = np.zeros(len(time_s))
     for hold in holds:
         far = hold.pose.copy()
         far[:3] += hold.back * rng.uniform(0.05, 0.09)
@@ -90,6 +109,8 @@ def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, rng: Ge
         near[:, 3:] = quat_multiply(near[:, 3:], quat_exp(_life(time_s, 3, _DRIFT_RAD, rng, _LIFE_HZ[:2])))
         share = ease(time_s, hold.reach_s, hold.contact_s - 0.2 * reach) - ease(time_s, hold.release_s + 0.15 * leave, hold.away_s)
         anchored = compose(obj, near)
+        arriving += ease(time_s, hold.contact_s - 0.6 * reach, hold.contact_s - 0.25 * reach)
+        arriving -= ease(time_s, hold.release_s + 0.25 * leave, hold.release_s + 0.7 * leave)
         pose = np.concatenate(
             [
                 pose[:, :3] + share[:, None] * (anchored[:, :3] - pose[:, :3]),
@@ -97,7 +118,19 @@ def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, rng: Ge
             ],
             axis=1,
         )
-    return pose
+    return _outside(pose, obj, side, shape, np.clip(1.0 - arriving, 0.0, 1.0))
+
+
+def _outside(pose: Array, obj: Array, side: Side, shape: Shape, share: Array) -> Array:
+    """A wrist moved away from the object so that its palm stays clear of it, where its `share (T,)` is 1."""
+    palm = np.array([-0.095 if side == "left" else 0.095, 0.0, -0.02])
+    place = transform(pose, palm)
+    distance, normal, _ = shape.signed_distance(transform(invert(obj), place))
+    near = np.maximum(_CLEAR_M - distance, 0.0)
+    push = near**2 / (near + 0.02) * share  # soft where it begins
+    moved = pose.copy()
+    moved[:, :3] += push[:, None] * quat_rotate(obj[:, 3:], normal)
+    return moved
 
 
 def _at_home(time_s: Array, side: Side, rng: Generator) -> Array:

@@ -23,7 +23,7 @@ from manipnet_tools.generate.motions import Hold, Scene
 from manipnet_tools.generate.proposals import CONE_RAD
 
 EVENTS: Final = ("lift", "hand over", "together", "near", "idle")
-_SHARES: Final = (0.48, 0.16, 0.18, 0.1, 0.08)
+_SHARES: Final = (0.36, 0.18, 0.34, 0.07, 0.05)
 _HANDS_APART_M: Final = 0.022
 _UP: Final = np.array([0.0, 1.0, 0.0])
 _TABLE_SHARE: Final = 0.75
@@ -57,9 +57,9 @@ class Director:
                 "hand over": self._hand_over,
                 "together": self._together,
                 "near": self._near,
-                "idle": lambda now, _: now + float(rng.uniform(0.8, 2.5)),
+                "idle": lambda now, _: now + float(rng.uniform(0.8, 2.0)),
             }[event](now, sides)
-            now += float(rng.uniform(0.05, 0.6))
+            now += float(rng.uniform(0.0, 0.4))
         return Scene(now + 0.3, start, tuple(self._moves), tuple(self._holds))
 
     def _lift(self, now: float, sides: list[Side]) -> float:
@@ -68,7 +68,7 @@ class Director:
         if grasp is None:
             return now
         contact = now + rng.uniform(0.6, 1.2)
-        release = contact + rng.uniform(1.4, 5.0)
+        release = contact + rng.uniform(2.0, 6.0)
         self._carry(contact + rng.uniform(0.03, 0.2), release - rng.uniform(0.05, 0.15), [grasp], lands=True)
         return self._hold("lift", grasp, now, contact, release)
 
@@ -93,7 +93,7 @@ class Director:
         if first is None or second is None:
             return self._lift(now, sides)
         contact, lag = now + rng.uniform(0.6, 1.1), rng.uniform(0.0, 0.5)
-        release = contact + lag + rng.uniform(1.4, 4.0)
+        release = contact + lag + rng.uniform(2.0, 6.0)
         self._carry(contact + lag + 0.1, release - 0.1, [first, second], lands=True)
         done = self._hold("together", first, now, contact, release)
         return max(done, self._hold("together", second, now + lag, contact + lag, release - rng.uniform(0.0, 0.3)))
