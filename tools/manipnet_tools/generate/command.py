@@ -66,7 +66,9 @@ def _begin(options: GenerateOptions, count: int) -> None:
         except ValueError:
             raise GenerateError(f"{path}: is damaged; write to another folder") from None
         if there != mine:
-            raise GenerateError(f"{options.out}: holds a set of {there}, and this is one of {mine}; write to another folder")
+            raise GenerateError(
+                f"{options.out}: holds a set of {there}, and this is one of {mine}; write to another folder"
+            )
     elif options.out.is_dir() and any(options.out.iterdir()):
         raise GenerateError(f"{options.out}: is not empty and holds no generated set; write to another folder")
     (options.out / "hands").mkdir(parents=True, exist_ok=True)
@@ -98,5 +100,3 @@ def _made(options: GenerateOptions, numbers: Sequence[int]) -> Iterator[MadeTake
                 raise GenerateError(f"a process died, perhaps for lack of memory; {remedy}") from None
             finally:
                 pool.shutdown(cancel_futures=True)
-
-

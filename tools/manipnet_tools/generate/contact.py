@@ -93,7 +93,17 @@ def normal_at(space: Space, x: float, y: float, z: float, out: Array):
 
 
 @_kernel
-def score_rows(space: Space, turn: Array, place: Array, points: Array, radii: Array, pads: Array, wanted: Array, gaps: Array, scores: Array):
+def score_rows(
+    space: Space,
+    turn: Array,
+    place: Array,
+    points: Array,
+    radii: Array,
+    pads: Array,
+    wanted: Array,
+    gaps: Array,
+    scores: Array,
+):
     """How well each row of a finger's table touches, into `gaps (R, 3)` and `scores (R,)`.
 
     `points (R, 3, S, 3)` are on the axes of the finger's capsules in the wrist frame and `pads (R, 3)` the direction of
@@ -131,7 +141,18 @@ def score_rows(space: Space, turn: Array, place: Array, points: Array, radii: Ar
 
 
 @_kernel
-def hand_gaps(space: Space, body: Body, angles: Array, turn: Array, place: Array, positions: Array, rotations: Array, axes: Array, gaps: Array, points: Array):
+def hand_gaps(
+    space: Space,
+    body: Body,
+    angles: Array,
+    turn: Array,
+    place: Array,
+    positions: Array,
+    rotations: Array,
+    axes: Array,
+    gaps: Array,
+    points: Array,
+):
     """Gaps of all capsules `(C,)`, and the points of their axes that are nearest to the object `(C, 3)`.
 
     Returns how far the thumb's outer capsules are from those of the fingers.
@@ -169,8 +190,12 @@ def _clearance(body: Body, positions: Array):
                 for q in range(3):
                     far = 0.0
                     for i in range(3):
-                        u = positions[body.starts[c], i] + 0.5 * s * (positions[body.ends[c], i] - positions[body.starts[c], i])
-                        u -= positions[body.starts[e], i] + 0.5 * q * (positions[body.ends[e], i] - positions[body.starts[e], i])
+                        u = positions[body.starts[c], i] + 0.5 * s * (
+                            positions[body.ends[c], i] - positions[body.starts[c], i]
+                        )
+                        u -= positions[body.starts[e], i] + 0.5 * q * (
+                            positions[body.ends[e], i] - positions[body.starts[e], i]
+                        )
                         far += u * u
                     least = min(least, np.sqrt(far) - body.radii[c] - body.radii[e])
     return least

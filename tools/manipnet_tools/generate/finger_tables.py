@@ -54,13 +54,17 @@ class Tables:
 def tables_of(hand: Hand) -> Tables:
     """The tables of a hand with the free hand's layout."""
     body = Body(hand.skeleton, hand.chains.starts, hand.chains.ends, hand.radii, hand.limits)
-    return Tables(hand, body, (_table(hand, 0, _thumb_rows(hand)), *(_table(hand, f, _finger_rows(hand, f)) for f in range(1, 5))))
+    return Tables(
+        hand, body, (_table(hand, 0, _thumb_rows(hand)), *(_table(hand, f, _finger_rows(hand, f)) for f in range(1, 5)))
+    )
 
 
 def _finger_rows(hand: Hand, finger: int) -> Array:
     limits = hand.limits[4 * finger : 4 * finger + 4]
     rows = []
-    for knuckle, middle, coupling in product(np.radians(np.arange(-14, 90, 8)), np.radians(np.arange(2, 111, 8)), (0.4, 0.67)):
+    for knuckle, middle, coupling in product(
+        np.radians(np.arange(-14, 90, 8)), np.radians(np.arange(2, 111, 8)), (0.4, 0.67)
+    ):
         for across in _ACROSS * max(np.cos(knuckle), 0.3):
             rows.append((knuckle, across, middle, coupling * middle))
     return np.clip(rows, *limits.T)
@@ -93,7 +97,9 @@ def _table(hand: Hand, finger: int, rows: Array) -> FingerTable:
 def _finger_costs(rows: Array) -> Array:
     knuckle, across, middle, end = rows.T
     together = (knuckle - 0.15 - 0.55 * middle) / 0.6
-    return 0.25 * (together**2 + ((middle - 0.7) / 0.9) ** 2 + (across / 0.15) ** 2 + ((end - 0.67 * middle) / 0.35) ** 2)
+    return 0.25 * (
+        together**2 + ((middle - 0.7) / 0.9) ** 2 + (across / 0.15) ** 2 + ((end - 0.67 * middle) / 0.35) ** 2
+    )
 
 
 def _thumb_costs(rows: Array) -> Array:

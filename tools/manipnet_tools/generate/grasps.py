@@ -1,9 +1,9 @@
 """Finds grasps of one object by searching how each finger may end at a pose of the wrist.
 
-The way there is not searched: a finger that closes from the open hand stops on the wall behind a handle and never makes
-the fist that people make. The four fingers are chosen together, so that neighbours are alike; then the thumb, so that it
-opposes them; then all are moved a little until they touch (`contact.settle`). What cannot carry the object whichever
-way gravity points is refused (`forces`).
+The way there is not searched: a finger that closes from the open hand stops on the wall behind a handle and never
+makes the fist that people make. The four fingers are chosen together, so that neighbours are alike; then the thumb, so
+that it opposes them; then all are moved a little until they touch (`contact.settle`). What cannot carry the object
+whichever way gravity points is refused (`forces`).
 """
 
 from collections import Counter
@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.random import Generator
 
 from manipnet.geometry import Array
 from manipnet_tools.generate.contact import Space, distance_at, look, score_rows, settle
@@ -32,7 +31,7 @@ _ROUNDS: Final = 6
 
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """A right hand on an object: the wrist's `turn (3, 3)` and `place (3,)` in the object's frame, and `angles (A,)`."""
+    """A right hand on an object: the wrist's `turn (3, 3)` and `place (3,)` in the object's frame, `angles (A,)`."""
 
     kind: str
     turn: Array
@@ -47,7 +46,7 @@ class Grasp:
 
 
 def find_grasp(tables: Tables, space: Space, proposal: Proposal, centre: Array, refused: Counter[str]) -> Grasp | None:
-    """The grasp at a proposed pose, or nothing; why not is counted in `refused`. `centre (3,)` is the centre of mass."""
+    """The grasp at a proposed pose, or nothing; `refused` counts why not. `centre (3,)` is the centre of mass."""
     turn, place = np.ascontiguousarray(proposal.turn), np.ascontiguousarray(proposal.place)
     if not _arm_free(space, turn, place):
         refused["arm or palm inside"] += 1
@@ -72,7 +71,9 @@ def _arm_free(space: Space, turn: Array, place: Array) -> bool:
     )
 
 
-def _scored(space: Space, turn: Array, place: Array, table: FingerTable, radii: Array, wanted: Array) -> tuple[Array, Array]:
+def _scored(
+    space: Space, turn: Array, place: Array, table: FingerTable, radii: Array, wanted: Array
+) -> tuple[Array, Array]:
     gaps, scores = np.empty((len(table.costs), 3)), np.empty(len(table.costs))
     score_rows(space, turn, place, table.points, radii[table.capsules], table.pads, wanted, gaps, scores)
     return gaps, scores
@@ -118,7 +119,7 @@ def _fingers(tables: Tables, space: Space, turn: Array, place: Array, wanted: Ar
 def _thumbs(tables: Tables, space: Space, turn: Array, place: Array, angles: Array, proposal: Proposal) -> list[Array]:
     """Angles with the best thumbs: they touch, oppose the fingers, and do not run into them."""
     table, wanted = tables.fingers[0], proposal.wanted[0]
-    gaps, scores = _scored(space, turn, place, table, tables.hand.radii, wanted)
+    _, scores = _scored(space, turn, place, table, tables.hand.radii, wanted)
     value = scores - table.costs
     rows = np.argpartition(-value, 3 * ROWS)[: 3 * ROWS]
     kept: list[tuple[float, Array]] = []

@@ -1,9 +1,9 @@
 """Motions of two hands with an object, made of reaches, holds, hand-overs and releases.
 
-A wrist moves freely until it reaches, and arrives with the object's own motion along the direction of its grasp (minimum
-jerk: Flash and Hogan 1985). The fingers open on the way, widest near two thirds of the reach, and each arrives at its
-contact from outside (Smeets and Brenner 1999). While it is held, the object goes through random poses; fingers and wrist
-are never quite still.
+A wrist moves freely until it reaches, and arrives with the object's own motion along the direction of its grasp
+(minimum jerk: Flash and Hogan 1985). The fingers open on the way, widest near two thirds of the reach, and each arrives
+at its contact from outside (Smeets and Brenner 1999). While it is held, the object goes through random poses; fingers
+and wrist are never quite still.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ from manipnet_tools.generate.finger_tables import RELAXED
 
 RATE_HZ: Final = 120.0
 _DRIFT_M, _DRIFT_RAD = 0.0008, 0.006
-_FREE_LIFE_RAD, _HELD_LIFE_RAD = np.radians(7.0), np.radians(2.2)
+_FREE_LIFE_RAD, _HELD_LIFE_RAD = np.radians(9.0), np.radians(3.0)
 _CLEAR_M: Final = 0.12
 """A hand that does not hold keeps its palm this far from the object."""
 _LIFE_HZ: Final = (0.4, 0.9, 1.8, 3.2, 5.0)
@@ -78,7 +78,10 @@ def play(
     held = np.zeros(len(time_s))
     for hold in scene.holds:
         if not hold.near_only:
-            held = np.maximum(held, ease(time_s, hold.contact_s, hold.contact_s + 0.3) - ease(time_s, hold.release_s - 0.3, hold.release_s))
+            held = np.maximum(
+                held,
+                ease(time_s, hold.contact_s, hold.contact_s + 0.3) - ease(time_s, hold.release_s - 0.3, hold.release_s),
+            )
     obj[:, :3] += held[:, None] * _life(time_s, 3, 0.0012, rng, _LIFE_HZ[:4])
     obj[:, 3:] = quat_multiply(obj[:, 3:], quat_exp(held[:, None] * _life(time_s, 3, 0.012, rng, _LIFE_HZ[:4])))
     wrists: dict[Side, Array] = {}
@@ -103,11 +106,18 @@ def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, shape: 
             far[:3] += 0.05 * hold.back
         reach, leave = hold.contact_s - hold.reach_s, hold.away_s - hold.release_s
         near = superpose(
-            time_s, far, [Move(hold.contact_s - 0.45 * reach, hold.contact_s, grasp), Move(hold.release_s, hold.release_s + 0.5 * leave, far)]
+            time_s,
+            far,
+            [
+                Move(hold.contact_s - 0.45 * reach, hold.contact_s, grasp),
+                Move(hold.release_s, hold.release_s + 0.5 * leave, far),
+            ],
         )
         near[:, :3] += _life(time_s, 3, _DRIFT_M, rng, _LIFE_HZ[:2])
         near[:, 3:] = quat_multiply(near[:, 3:], quat_exp(_life(time_s, 3, _DRIFT_RAD, rng, _LIFE_HZ[:2])))
-        share = ease(time_s, hold.reach_s, hold.contact_s - 0.2 * reach) - ease(time_s, hold.release_s + 0.15 * leave, hold.away_s)
+        share = ease(time_s, hold.reach_s, hold.contact_s - 0.2 * reach) - ease(
+            time_s, hold.release_s + 0.15 * leave, hold.away_s
+        )
         anchored = compose(obj, near)
         arriving += ease(time_s, hold.contact_s - 0.6 * reach, hold.contact_s - 0.25 * reach)
         arriving -= ease(time_s, hold.release_s + 0.25 * leave, hold.release_s + 0.7 * leave)
@@ -150,7 +160,8 @@ def _home(rng: Generator) -> Array:
     """A pose of the right wrist beside the object's place: fingers forward, palm down or inward."""
     forward = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]).T  # x forward, y to the left, z up
     turn = rng.normal(0.0, [0.3, 0.35, 0.35])
-    quat = quat_multiply(matrix_to_quat(forward), quat_exp(turn + [rng.uniform(-0.3, 1.3), 0.0, 0.0]))
+    turn[0] += rng.uniform(-0.3, 1.3)
+    quat = quat_multiply(matrix_to_quat(forward), quat_exp(turn))
     return np.concatenate([[rng.uniform(0.1, 0.32), rng.uniform(-0.08, 0.2), rng.uniform(0.15, 0.4)], quat])
 
 
@@ -179,7 +190,11 @@ def _fingers(time_s: Array, holds: Sequence[Hold], limits: Array, rng: Generator
             angles[:, own] += open_share[:, None] * (opened - angles[:, own])
             angles[:, own] += np.clip(closed, 0.0, 1.0)[:, None] * (target - angles[:, own])
         if not hold.near_only:
-            quiet = np.maximum(quiet, ease(time_s, hold.contact_s - 0.2, hold.contact_s + 0.1) - ease(time_s, hold.release_s - 0.1, hold.release_s + 0.1))
+            quiet = np.maximum(
+                quiet,
+                ease(time_s, hold.contact_s - 0.2, hold.contact_s + 0.1)
+                - ease(time_s, hold.release_s - 0.1, hold.release_s + 0.1),
+            )
     life = _life(time_s, count, 1.0, rng, _LIFE_HZ)
     angles += life * (quiet * _HELD_LIFE_RAD + (1.0 - quiet) * _FREE_LIFE_RAD)[:, None]
     return np.clip(angles, *limits.T)

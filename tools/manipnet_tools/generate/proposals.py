@@ -1,7 +1,8 @@
 """Where a hand might be when it holds an object: poses of the wrist, by type of grasp.
 
 The types are the main branches of the taxonomy of Feix et al. 2016: power grasps around bars and bodies, hooks, pinches
-and tripods, lateral pinches, discs held from above, and flat hands. All poses are of a right hand in the object's frame.
+and tripods, lateral pinches, discs held from above, and flat hands. All poses are of a right hand in the object's
+frame.
 """
 
 from collections.abc import Sequence
@@ -138,13 +139,19 @@ def _around(tables: Tables, site: Site, kind: str, rng: Generator) -> Proposal:
     if site.kind == "stick":
         swing = 0.0
     x, z = x * np.cos(swing) - z * np.sin(swing), z * np.cos(swing) + x * np.sin(swing)
-    slant = np.radians(rng.normal(4.0 if hooked else 14.0, 8.0))  # the bar runs from the index finger to the heel of the hand
+    slant = np.radians(
+        rng.normal(4.0 if hooked else 14.0, 8.0)
+    )  # the bar runs from the index finger to the heel of the hand
     x, y = x * np.cos(slant) + along * np.sin(slant), along * np.cos(slant) - x * np.sin(slant)
     turn = _near(np.stack([x, y, z], axis=1), 0.10, rng)
     if hooked:
         at = [knuckle[0] + rng.uniform(0.012, 0.045), 0.0, knuckle[2] - 0.009 - site.radius - rng.uniform(0.0, 0.004)]
     else:
-        at = [knuckle[0] + rng.uniform(-0.028, 0.012), 0.0, knuckle[2] - palm - site.radius - rng.uniform(-0.002, 0.006)]
+        at = [
+            knuckle[0] + rng.uniform(-0.028, 0.012),
+            0.0,
+            knuckle[2] - palm - site.radius - rng.uniform(-0.002, 0.006),
+        ]
     at[1] = rng.uniform(-0.028, 0.012)
     place = site.point - turn @ np.array(at)
     thumb = _POWER if not hooked or rng.random() < 0.5 else (0.0, 0.5, 0.8)
@@ -188,7 +195,9 @@ def _on_surface(tables: Tables, corners: Array, kind: str, rng: Generator) -> Pr
     y /= np.linalg.norm(y)
     turn = np.stack([np.cross(y, z), y, z], axis=1)
     knuckle, palm = hand.offsets[8], hand.radii[1]
-    off = {"above": rng.uniform(0.02, 0.05), "palm": rng.uniform(-0.001, 0.012), "flat": rng.uniform(-0.001, 0.002)}[kind]
+    off = {"above": rng.uniform(0.02, 0.05), "palm": rng.uniform(-0.001, 0.012), "flat": rng.uniform(-0.001, 0.002)}[
+        kind
+    ]
     reach = rng.uniform(0.065, 0.1) + (0.025 if kind == "above" else 0.0)
     at = np.array([reach, rng.uniform(-0.02, 0.015), knuckle[2] - palm - off])
     row = {"above": _PRECISE, "palm": _POWER, "flat": _FLAT}[kind]
@@ -213,7 +222,11 @@ def _edge(site: Site, rng: Generator) -> tuple[Array, Array, Array, float]:
     if site.kind == "rim":
         line = np.cross(site.out, site.along)
         return site.point - site.out * rng.uniform(0.002, 0.014), line, -site.out, 2.0 * site.radius
-    line = _rotated(site.out if site.kind == "stick" else site.along, site.along if site.kind == "stick" else site.out, rng.uniform(0, 2 * np.pi))
+    line = _rotated(
+        site.out if site.kind == "stick" else site.along,
+        site.along if site.kind == "stick" else site.out,
+        rng.uniform(0, 2 * np.pi),
+    )
     toward = -site.out if site.kind == "knob" else _rotated(site.along, line, rng.uniform(0.0, 2.0 * np.pi))
     return site.point, line, toward, 2.0 * site.radius
 

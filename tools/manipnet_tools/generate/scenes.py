@@ -110,11 +110,26 @@ class Director:
         away = release + float(self._rng.uniform(0.5, 0.95))
         self._holds.append(
             Hold(
-                grasp.side, reach, contact, release, away, grasp.pose, grasp.angles, grasp.opened, grasp.back, event == "near"
+                grasp.side,
+                reach,
+                contact,
+                release,
+                away,
+                grasp.pose,
+                grasp.angles,
+                grasp.opened,
+                grasp.back,
+                event == "near",
             )
         )
         self.events.append(
-            {"event": event, "side": grasp.side, "grasp": grasp.kind, "start_s": round(contact, 3), "end_s": round(release, 3)}
+            {
+                "event": event,
+                "side": grasp.side,
+                "grasp": grasp.kind,
+                "start_s": round(contact, 3),
+                "end_s": round(release, 3),
+            }
         )
         return away
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
-from manipnet_tools.assets.objects import curve, subdivided, turns
-from manipnet_tools.generate.solids import LONGEST_EDGE_MM, Site, Solid, box, convex, tube, turned, union
+from manipnet_tools.assets.objects import curve, turns
+from manipnet_tools.generate.solids import Site, Solid, box, convex, tube, turned, union
 
 TRIES: Final = 20
 _X, _Y, _Z = np.eye(3)
@@ -75,7 +75,10 @@ def _prism(rng: Generator) -> Solid:
 def _superquadric(rng: Generator) -> Solid:
     ball = trimesh.creation.icosphere(4, 1.0)
     e, a = rng.uniform(0.35, 1.3, 2)
-    polar, azimuth = np.arcsin(np.clip(ball.vertices[:, 1], -1, 1)), np.arctan2(ball.vertices[:, 2], ball.vertices[:, 0])
+    polar, azimuth = (
+        np.arcsin(np.clip(ball.vertices[:, 1], -1, 1)),
+        np.arctan2(ball.vertices[:, 2], ball.vertices[:, 0]),
+    )
 
     def power(x: Array, p: float) -> Array:
         return np.sign(x) * np.abs(x) ** p
@@ -126,7 +129,9 @@ def _extrusion(rng: Generator) -> Solid:
     depth, arm = rng.uniform(18, 45), rng.uniform(18, 32)
     tall, wide = rng.uniform(70, 140), rng.uniform(50, 110)
     stem = box((arm, tall, depth))
-    beam = box((wide, arm, depth)).moved(_shift(_X * rng.uniform(0.0, 0.4) * wide + _Y * rng.choice([-0.5, 0.0, 0.5]) * (tall - arm)))
+    beam = box((wide, arm, depth)).moved(
+        _shift(_X * rng.uniform(0.0, 0.4) * wide + _Y * rng.choice([-0.5, 0.0, 0.5]) * (tall - arm))
+    )
     return _held(union([stem, beam]), [Site("stick", np.zeros(3), _Y, _X, arm / 2)])
 
 
@@ -135,9 +140,19 @@ def _bottle(rng: Generator) -> Solid:
     neck, shoulder = rng.uniform(0.28, 0.6) * radius, rng.uniform(0.1, 0.28) * height
     waist = rng.uniform(0.85, 1.0) * radius
     line = curve(
-        [(radius, -height / 2), (waist, -0.2 * height), (radius, shoulder), (neck, shoulder + 0.16 * height), (neck, height / 2)], 20
+        [
+            (radius, -height / 2),
+            (waist, -0.2 * height),
+            (radius, shoulder),
+            (neck, shoulder + 0.16 * height),
+            (neck, height / 2),
+        ],
+        20,
     )
-    sites = [*_sticks(rng, -0.3 * height, 0.6 * shoulder, waist, 4), *_sticks(rng, 0.4 * height, 0.45 * height, neck, 1)]
+    sites = [
+        *_sticks(rng, -0.3 * height, 0.6 * shoulder, waist, 4),
+        *_sticks(rng, 0.4 * height, 0.45 * height, neck, 1),
+    ]
     return _held(turned(line, corner=2.0), sites)
 
 
@@ -157,13 +172,19 @@ def _goblet(rng: Generator) -> Solid:
     )  # fmt: skip
     line = np.vstack([(foot, -height / 2), (foot, 3 - height / 2), line])
     sites = _sticks(rng, 18 - height / 2, knee - 10, stem, 4)
-    sites += [Site(s.kind, s.point + _Y * (knee + 0.22 * height), s.along, s.out, bowl) for s in _sticks(rng, 0, 1, bowl, 3)]
+    sites += [
+        Site(s.kind, s.point + _Y * (knee + 0.22 * height), s.along, s.out, bowl) for s in _sticks(rng, 0, 1, bowl, 3)
+    ]
     return _held(turned(line, corner=1.0), sites)
 
 
 def _vessel(rng: Generator, radius: float, height: float, hollow: bool, wall: float) -> tuple[Solid, NDArray]:
     """A cup, and its outside line."""
-    foot, middle, lip = radius * rng.uniform(0.7, 1.0), radius * rng.uniform(0.92, 1.08), radius * rng.uniform(0.85, 1.0)
+    foot, middle, lip = (
+        radius * rng.uniform(0.7, 1.0),
+        radius * rng.uniform(0.92, 1.08),
+        radius * rng.uniform(0.85, 1.0),
+    )
     outer = curve([(foot, -height / 2), (middle, 0.0), (lip, height / 2)], 10)
     if not hollow:
         return turned(outer, corner=2.0), outer
@@ -177,7 +198,9 @@ def _cup(rng: Generator) -> Solid:
     radius, height, wall = rng.uniform(26, 45), rng.uniform(50, 120), rng.uniform(3, 6)
     solid, outer = _vessel(rng, radius, height, rng.random() < 0.7, wall)
     lip = outer[-1, 0] - wall / 2
-    return _held(solid, [*_sticks(rng, -0.3 * height, 0.3 * height, radius, 4), *_rims(rng, lip, height / 2, wall / 2, 2)])
+    return _held(
+        solid, [*_sticks(rng, -0.3 * height, 0.3 * height, radius, 4), *_rims(rng, lip, height / 2, wall / 2, 2)]
+    )
 
 
 def _bowl(rng: Generator) -> Solid:
@@ -190,13 +213,19 @@ def _bowl(rng: Generator) -> Solid:
 
 
 def _handle(rng: Generator, outer: NDArray, low: float, high: float, gap: tuple[float, float] = (24, 42)) -> Solid:
-    """A side handle between two heights of a vessel, on its +x side: round, square, ear-shaped, flat or an open hook."""
+    """A side handle between two heights of a vessel, at +x: round, square, ear-shaped, flat or an open hook."""
     r0, r1 = np.interp([low, high], outer[:, 1], outer[:, 0])
     out, middle, tall = max(r0, r1) + rng.uniform(*gap), 0.5 * (low + high), high - low
     form = rng.choice(["round", "square", "ear", "hook", "straight"], p=[0.3, 0.25, 0.2, 0.1, 0.15])
     bulge = {"round": 0.55, "square": 0.9, "ear": 0.5, "hook": 0.85, "straight": 0.95}[form]
     top, bottom = middle + 0.5 * bulge * tall, middle - 0.5 * bulge * tall
-    knots = [(r1 - 5, high), (0.5 * (r1 + out), high + (2 if form != "straight" else 0)), (out, top), (out, middle), (out, bottom)]
+    knots = [
+        (r1 - 5, high),
+        (0.5 * (r1 + out), high + (2 if form != "straight" else 0)),
+        (out, top),
+        (out, middle),
+        (out, bottom),
+    ]
     knots += [] if form == "hook" else [(0.5 * (r0 + out), low), (r0 - 5, low)]
     if form == "ear":
         knots[2], knots[4] = (out + 4, top + 4), (out - 0.3 * (out - r0), bottom)
@@ -221,7 +250,9 @@ def _mug(rng: Generator) -> Solid:
     tall = rng.uniform(0.5, 0.85) * height
     middle = rng.uniform(-0.06, 0.06) * height
     handle = _handle(rng, outer, max(middle - tall / 2, 9 - height / 2), min(middle + tall / 2, height / 2 - 9))
-    return _joined(body, handle, hollow_to=outer, wall=wall, extra=_rims(rng, outer[-1, 0] - wall / 2, height / 2, wall / 2, 1))
+    return _joined(
+        body, handle, hollow_to=outer, wall=wall, extra=_rims(rng, outer[-1, 0] - wall / 2, height / 2, wall / 2, 1)
+    )
 
 
 def _jug(rng: Generator) -> Solid:
@@ -235,7 +266,9 @@ def _jug(rng: Generator) -> Solid:
         reach = np.interp(-0.1 * height, outer[:, 1], outer[:, 0])
         line = curve([(-reach + 6, -0.15 * height), (-reach - 20, 0.05 * height), (-reach - 32, 0.3 * height)], 9)
         size = rng.uniform(11, 20)
-        parts.append(tube(np.c_[line, np.zeros(9)], np.linspace(size, 0.7 * size, 9), np.linspace(size, 0.7 * size, 9), _Z))
+        parts.append(
+            tube(np.c_[line, np.zeros(9)], np.linspace(size, 0.7 * size, 9), np.linspace(size, 0.7 * size, 9), _Z)
+        )
     return union(parts)
 
 
@@ -255,7 +288,12 @@ def _top_handle(rng: Generator, half: float, top: float) -> Solid:
     half = max(half, 32.0)
     rise, thick, width = rng.uniform(34, 52), rng.uniform(8, 13), rng.uniform(10, 18)
     square = rng.uniform(0.55, 0.95)
-    knots = [(half, top - 4), (half, top + 0.6 * rise), (square * half, top + rise), (0, top + rise * rng.uniform(1.0, 1.15))]
+    knots = [
+        (half, top - 4),
+        (half, top + 0.6 * rise),
+        (square * half, top + rise),
+        (0, top + rise * rng.uniform(1.0, 1.15)),
+    ]
     knots += [(-x, y) for x, y in knots[-2::-1]]
     line = _smooth_path(np.array(knots), 28)
     path = np.c_[line, np.zeros(28)]
@@ -306,7 +344,15 @@ def _lid(rng: Generator) -> Solid:
     if rng.random() < 0.3:
         return union([disc, _top_handle(rng, 34.0, thick)])
     knob, neck, rise = rng.uniform(9, 19), rng.uniform(0.35, 0.7), rng.uniform(18, 34)
-    line = curve([(knob * neck, thick - 3), (knob * neck, thick + 0.35 * rise), (knob, thick + 0.75 * rise), (0.7 * knob, thick + rise)], 10)
+    line = curve(
+        [
+            (knob * neck, thick - 3),
+            (knob * neck, thick + 0.35 * rise),
+            (knob, thick + 0.75 * rise),
+            (0.7 * knob, thick + rise),
+        ],
+        10,
+    )
     site = Site("knob", _Y * (thick + 0.72 * rise), _X, _Y, knob)
     return union([disc, _held(turned(line), [site, site, site])])
 
@@ -374,6 +420,7 @@ KINDS: Final[dict[str, tuple[float, Callable[[Generator], Solid]]]] = {
     "mug": (15, _mug), "jug": (9, _jug), "kettle": (4, _kettle), "case": (4, _case), "pan": (6, _pan),
     "tool": (7, _tool), "lid": (5, _lid), "goblet": (5, _goblet), "cup": (6, _cup), "bowl": (4, _bowl),
     "bottle": (6, _bottle), "vase": (5, _vase), "rod": (4, _rod), "plate": (4, _plate), "torus": (3, _torus),
-    "box": (4, _blocks), "prism": (3, _prism), "superquadric": (4, _superquadric), "letter": (3, _extrusion), "pair": (3, _pair),
+    "box": (4, _blocks), "prism": (3, _prism), "superquadric": (4, _superquadric), "letter": (3, _extrusion),
+    "pair": (3, _pair),
 }  # fmt: skip
 """Kinds of shapes, how often each is made, and how."""

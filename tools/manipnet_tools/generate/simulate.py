@@ -1,4 +1,4 @@
-"""Whether a grasp holds in a simulator (MuJoCo): the fingers press, then gravity pulls the object one way after the other.
+"""Whether a grasp holds in a simulator (MuJoCo): the fingers press, then gravity pulls one way after the other.
 
 The fingers are chains of hinges with servos. Each servo aims a little beyond the pose, by the torque that balanced
 forces at the contacts need: closing all joints a bit instead would move them by degrees. Everything is in the object's
@@ -117,11 +117,19 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
     bodies = {0: spec.worldbody.add_body(name="wrist", gravcomp=1.0)}
     for bone in range(1, hand.bone_count):
         bodies[bone] = bodies[int(hand.parents[bone])].add_body(
-            name=hand.joint_names[bone], pos=hand.offsets[bone], gravcomp=1.0, mass=0.01, inertia=[1e-6] * 3, explicitinertial=True
+            name=hand.joint_names[bone],
+            pos=hand.offsets[bone],
+            gravcomp=1.0,
+            mass=0.01,
+            inertia=[1e-6] * 3,
+            explicitinertial=True,
         )
         for a in np.flatnonzero(hand.angle_bones == bone):
             joint = bodies[bone].add_joint(
-                name=hand.angle_names[a], type=mujoco.mjtJoint.mjJNT_HINGE, axis=hand.axes[a], range=hand.limits[a] + [-0.3, 0.3]
+                name=hand.angle_names[a],
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=hand.axes[a],
+                range=hand.limits[a] + [-0.3, 0.3],
             )
             joint.armature = 1e-4
             joint.damping[0] = 0.05

@@ -6,8 +6,10 @@ which takes minutes for a mesh.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
+import manifold3d as _  # noqa: F401  trimesh's unions need it, and say so only when one is made
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
@@ -96,14 +98,14 @@ def turned(outer: NDArray, inner: NDArray | None = None, corner: float = 1.5) ->
     solid = [band for band in _bands(_between(outer, outer[0, 1], bottom))]
     heights = np.linspace(bottom, outer[-1, 1], BANDS)
     walls = []
-    for low, high in zip(heights[:-1], heights[1:], strict=True):
+    for low, high in pairwise(heights):
         rings = [(_radius(line_, y), y) for y in (low, high) for line_ in (outer, inner)]
         walls += [_sector(rings, k) for k in range(SECTORS)]
     return Solid(_revolved(line), (*(_disc(band) for band in solid), *walls))
 
 
 def tube(path: Array, thickness: NDArray, width: NDArray, normal: Array, closed: bool = False) -> Solid:
-    """A bar of elliptic section along `path (n, 3)`: `thickness (n,)` across in its plane, `width (n,)` along `normal`."""
+    """A bar of elliptic section along `path (n, 3)`: `thickness (n,)` in its plane, `width (n,)` along `normal`."""
     along = np.roll(path, -1, 0) - np.roll(path, 1, 0) if closed else np.gradient(path, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     across = np.cross(normal, along)

@@ -1,7 +1,7 @@
 """Generated takes on disk: `takes/<take>/take.npz` beside `meshes` and `hands` of the same folder (`docs/generate.md`).
 
-A take has both hands as poses of the wrists and angles of the hinges, and one object. Arrays are float32, in the project
-frame; a left hand's angles are those of its mirror image, as everywhere.
+A take has both hands as poses of the wrists and angles of the hinges, and one object. Arrays are float32, in the
+project frame; a left hand's angles are those of its mirror image, as everywhere.
 """
 
 import json
