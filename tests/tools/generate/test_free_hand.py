@@ -12,6 +12,7 @@ from manipnet.synthesis.hand.skin import skinned
 from manipnet.synthesis.hand.validation import check_hand
 from manipnet.synthesis.model.layout import layout_of
 from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet_tools.generate.bone_frames import in_frames_of
 from manipnet_tools.generate.free_hand import FREE_HAND, free_hand
 from manipnet_tools.generate.makehuman import Assets, MakeHumanError, default_adult
 from manipnet_tools.generate.proportions import HANDS, Proportions, drawn_proportions, proportioned
@@ -83,6 +84,18 @@ def test_proportions_change_what_they_say():
     long = proportioned(free, Proportions(1.0, 1.2, 1.0), "long fingers")
     assert np.allclose(long.offsets[5], free.offsets[5])
     assert np.allclose(long.offsets[[6, 7, 18]], 1.2 * free.offsets[[6, 7, 18]])
+
+
+def test_other_frames_of_the_bones_change_nothing_but_their_rotations():
+    free, model = free_hand(), shipped_hand()
+    turned = in_frames_of(free, model)
+    check_hand(turned)
+    angles = np.random.default_rng(2).uniform(*free.limits.T, size=(50, free.angle_count))
+    (before, rotations), (after, others) = (forward_kinematics(hand, angles) for hand in (free, turned))
+    assert np.allclose(before, after, atol=1e-9)
+    assert np.allclose(skinned(free, before, rotations), skinned(turned, after, others), atol=1e-9)
+    flat = forward_kinematics(turned, np.zeros(20))[1]
+    assert np.allclose(flat[1:], forward_kinematics(model, np.zeros(20))[1][1:], atol=1e-9)
 
 
 def test_a_file_without_the_assets_is_refused(tmp_path: Path):
