@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.hand import Hand, Indices
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 
 HANDS: Final = 16
@@ -54,7 +54,7 @@ def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
     along = np.einsum("bji,bj->bi", turns, along / np.linalg.norm(along, axis=1, keepdims=True))  # in each bone's frame
     stretch = np.array([long[child[bone]] if bone else 1.0 for bone in range(hand.bone_count)])
 
-    def grown(points: Array, bones: Array) -> Array:
+    def grown(points: Array, bones: Indices) -> Array:
         """Points in the frames of their bones `(..., 3)`."""
         direction = along[bones]
         reach = np.sum(points * direction, axis=-1, keepdims=True)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manipnet.geometry import Array, Side, mirror_points, quat_rotate, transform
 from manipnet.synthesis.hand.hand import Hand
@@ -46,7 +47,7 @@ def write_grasp_sheet(folder: Path, path: Path) -> None:
 def _picture(folder: Path, take: GeneratedTake, hand: Hand, side: Side, frame: int) -> Image:
     """The object and both hands at a frame, seen from the thumb's and palm's side of one hand."""
     mesh = load_mesh(mesh_file(folder, take.object_name))
-    meshes = [PaintedMesh(transform(take.object[frame], mesh.vertices), mesh.faces)]
+    meshes = [PaintedMesh(transform(take.object[frame], mesh.vertices), mesh.faces.astype(np.int64))]
     for other, colour in _SIDE_COLOURS.items():
         vertices, faces = _skin(hand, take, other, frame)
         meshes.append(PaintedMesh(vertices, faces, colour))
@@ -58,9 +59,9 @@ def _picture(folder: Path, take: GeneratedTake, hand: Hand, side: Side, frame: i
     return render(meshes, Camera(target + 0.55 * toward / np.linalg.norm(toward), target), SIZE)
 
 
-def _skin(hand: Hand, take: GeneratedTake, side: Side, frame: int) -> tuple[Array, Array]:
+def _skin(hand: Hand, take: GeneratedTake, side: Side, frame: int) -> tuple[Array, NDArray[np.int64]]:
     vertices = skinned(hand, *forward_kinematics(hand, take.angles[side][frame]))
-    faces = hand.skin.faces
+    faces = hand.skin.faces.astype(np.int64)
     if side == "left":
         vertices, faces = mirror_points(vertices), faces[:, ::-1]
     return transform(take.wrists[side][frame], vertices), faces

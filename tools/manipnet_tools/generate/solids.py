@@ -77,7 +77,7 @@ def convex(points: Array) -> Solid:
     return Solid(mesh if mesh.is_watertight else hull, (np.asarray(hull.vertices),))
 
 
-def box(size: Sequence[float]) -> Solid:
+def box(size: Sequence[float] | NDArray) -> Solid:
     """A box about the origin."""
     mesh = trimesh.creation.box(size)
     times = int(np.clip(np.ceil(np.log2(max(size) / LONGEST_EDGE_MM)), 0, 4))

@@ -76,7 +76,9 @@ def _side_handle(rng: Generator, outer: NDArray, low: float, high: float, gap: t
         tangent = np.gradient(path, axis=0)[k]
         tangent /= np.linalg.norm(tangent)
         tangent *= np.sign(tangent[1]) or 1.0
-        sites.append(Site("bar", path[k], tangent, np.cross(tangent, _Z), 0.25 * (thick + width)))
+        sites.append(
+            Site("bar", path[k], tangent, np.cross(tangent, np.array([0.0, 0.0, 1.0])), 0.25 * (thick + width))
+        )
     return with_sites(solid, sites)
 
 
