@@ -19,6 +19,7 @@ from manipnet_tools.takes.take import TakeError, read_take
 from manipnet_tools.takes.take_file import read_take_file
 from manipnet_tools.training.dataset import load_captured_hands, samples_at
 
+pytestmark = pytest.mark.slow
 SEED = 4
 
 

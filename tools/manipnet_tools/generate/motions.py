@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 from numpy.random import Generator
+from scipy.ndimage import gaussian_filter1d
 
 from manipnet.geometry import (
     SIDES,
@@ -23,7 +24,6 @@ from manipnet.geometry import (
     mirror_poses,
     quat_exp,
     quat_multiply,
-    quat_rotate,
     quat_slerp,
     transform,
 )
@@ -36,6 +36,8 @@ _DRIFT_M, _DRIFT_RAD = 0.0008, 0.006
 _FREE_LIFE_RAD, _HELD_LIFE_RAD = np.radians(9.0), np.radians(3.0)
 _CLEAR_M: Final = 0.12
 """A hand that does not hold keeps its palm this far from the object."""
+_GIVES_WAY_M: Final = np.array([0.0, 0.05, 0.04])
+_GIVES_WAY_S: Final = 0.06
 _LIFE_HZ: Final = (0.4, 0.9, 1.8, 3.2, 5.0)
 
 
@@ -132,14 +134,22 @@ def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, shape: 
 
 
 def _outside(pose: Array, obj: Array, side: Side, shape: Shape, share: Array) -> Array:
-    """A wrist moved away from the object so that its palm stays clear of it, where its `share (T,)` is 1."""
+    """A wrist moved away from the object so that its palm stays clear of it, where its `share (T,)` is 1.
+
+    It gives way from the middle of the object, and rather upward and toward the person. The normal of the nearest
+    surface would make it jump where a palm passes through the middle.
+    """
     palm = np.array([-0.095 if side == "left" else 0.095, 0.0, -0.02])
-    place = transform(pose, palm)
-    distance, normal, _ = shape.signed_distance(transform(invert(obj), place))
-    near = np.maximum(_CLEAR_M - distance, 0.0)
-    push = near**2 / (near + 0.02) * share  # soft where it begins
+    middle = transform(obj, shape.center_of_mass)
     moved = pose.copy()
-    moved[:, :3] += push[:, None] * quat_rotate(obj[:, 3:], normal)
+    for _ in range(2):
+        place = transform(moved, palm)
+        distance = shape.signed_distance(transform(invert(obj), place))[0]
+        near = np.maximum(_CLEAR_M - distance, 0.0)
+        push = near**2 / (near + 0.02) * share  # soft where it begins
+        away = place - middle + _GIVES_WAY_M
+        away /= np.linalg.norm(away, axis=1, keepdims=True) + 0.02
+        moved[:, :3] += gaussian_filter1d(push[:, None] * away, _GIVES_WAY_S * RATE_HZ, axis=0)
     return moved
 
 
