@@ -25,6 +25,8 @@ WANTED_GAP_M = -0.0008
 DEPTH_M = 0.0016
 """Deeper contacts cost."""
 _kernel = njit(cache=True, nogil=True, error_model="numpy")
+_inner = njit(nogil=True, error_model="numpy")
+"""For what kernels call: a cached function that calls a cached one can lose what that one calls."""
 
 
 class Space(NamedTuple):
@@ -62,7 +64,7 @@ def mirrored_space(space: Space) -> Space:
     return Space(np.ascontiguousarray(space.distance[::-1]), np.array([-high, *space.low[1:]]), space.cell_m)
 
 
-@_kernel
+@_inner
 def distance_at(space: Space, x: float, y: float, z: float):
     """Signed distance at a point; beyond the grid the way to it is added."""
     grid, low, cell = space.distance, space.low, space.cell_m
@@ -81,6 +83,12 @@ def distance_at(space: Space, x: float, y: float, z: float):
 
 
 @_kernel
+def distance_of(space: Space, point: Array):
+    """Signed distance at `point (3,)`, for callers that are not compiled."""
+    return distance_at(space, point[0], point[1], point[2])
+
+
+@_inner
 def normal_at(space: Space, x: float, y: float, z: float, out: Array):
     """The direction away from the object's surface at a point, into `out (3,)`."""
     h = 0.0012
@@ -140,7 +148,7 @@ def score_rows(
         scores[r] = score
 
 
-@_kernel
+@_inner
 def hand_gaps(
     space: Space,
     body: Body,
@@ -178,7 +186,7 @@ def hand_gaps(
     return _clearance(body, positions)
 
 
-@_kernel
+@_inner
 def _clearance(body: Body, positions: Array):
     """The smallest distance between capsules of different digits, metres; negative where they overlap."""
     least = 1e9

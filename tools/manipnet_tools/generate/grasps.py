@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array
-from manipnet_tools.generate.contact import Space, distance_at, look, score_rows, settle
+from manipnet_tools.generate.contact import Space, distance_of, look, score_rows, settle
 from manipnet_tools.generate.finger_tables import RELAXED, FingerTable, Tables
 from manipnet_tools.generate.forces import carried, cone_columns
 from manipnet_tools.generate.proposals import Proposal
@@ -67,7 +67,7 @@ def find_grasp(tables: Tables, space: Space, proposal: Proposal, centre: Array, 
 def _arm_free(space: Space, turn: Array, place: Array) -> bool:
     """Whether the wrist and a straight forearm are outside the object."""
     return all(
-        distance_at(space, *(place - 0.02 * k * turn[:, 0])) > (0.018 if k == 0 else FOREARM_M) for k in range(0, 9, 2)
+        distance_of(space, place - 0.02 * k * turn[:, 0]) > (0.018 if k == 0 else FOREARM_M) for k in range(0, 9, 2)
     )
 
 
