@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from manipnet.common.kernel_compiler import KernelCompiler
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Skeleton
 from manipnet.synthesis.hand.kinematics import forward_kinematics_into
@@ -24,9 +25,9 @@ WANTED_GAP_M = -0.0008
 """The skin yields: a contact is this deep."""
 DEPTH_M = 0.0016
 """Deeper contacts cost."""
-_kernel = njit(cache=True, nogil=True, error_model="numpy")
-_inner = njit(nogil=True, error_model="numpy")
-"""For what kernels call: a cached function that calls a cached one can lose what that one calls."""
+_kernel = njit(nogil=True, error_model="numpy", pipeline_class=KernelCompiler)
+"""As `manipnet.jit.kernel`, whose inner functions these call, but they may allocate."""
+_inner = _kernel
 
 
 class Space(NamedTuple):
