@@ -84,6 +84,9 @@ def test_hands_stay_inside_their_limits_and_move_smoothly(data: Path):
             assert (take.angles[side] <= hand.limits[:, 1] + 1e-5).all()
             steps = np.linalg.norm(np.diff(take.wrists[side][:, :3], axis=0), axis=1)
             assert steps.max() * take.rate_hz < 6.0, "no wrist jumps"
+            quats = take.wrists[side][:, 3:]
+            turns = 2.0 * np.arccos(np.clip(np.abs(np.sum(quats[1:] * quats[:-1], axis=1)), 0.0, 1.0))
+            assert turns.max() * take.rate_hz < 40.0, "no wrist turns at once"
             assert np.abs(np.diff(take.angles[side], axis=0)).max() * take.rate_hz < 30.0
 
 

@@ -19,12 +19,12 @@ from manipnet.geometry import (
     Array,
     Side,
     compose,
+    continuous_quats,
     invert,
     matrix_to_quat,
     mirror_poses,
     quat_exp,
     quat_multiply,
-    quat_slerp,
     transform,
 )
 from manipnet.synthesis.objects.shape import Shape
@@ -126,11 +126,25 @@ def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, shape: 
         pose = np.concatenate(
             [
                 pose[:, :3] + share[:, None] * (anchored[:, :3] - pose[:, :3]),
-                quat_slerp(pose[:, 3:], anchored[:, 3:], share),
+                _turned(pose[:, 3:], anchored[:, 3:], share, time_s, hold),
             ],
             axis=1,
         )
     return _outside(pose, obj, side, shape, np.clip(1.0 - arriving, 0.0, 1.0))
+
+
+def _turned(free: Array, held: Array, share: Array, time_s: Array, hold: Hold) -> Array:
+    """Quaternions `(T, 4)` between two motions, on one way round for the whole reach and one for the whole departure.
+
+    The shorter way at each frame would jump where the motions are half a turn apart.
+    """
+    free, held = continuous_quats(free), continuous_quats(held)
+    early = time_s < 0.5 * (hold.contact_s + hold.release_s)
+    for part, at_s in ((early, 0.5 * (hold.reach_s + hold.contact_s)), (~early, 0.5 * (hold.release_s + hold.away_s))):
+        frame = min(int(at_s * RATE_HZ), len(time_s) - 1)
+        held[part] *= 1.0 if free[frame] @ held[frame] >= 0.0 else -1.0
+    mixed = free + share[:, None] * (held - free)
+    return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
 
 
 def _outside(pose: Array, obj: Array, side: Side, shape: Shape, share: Array) -> Array:
