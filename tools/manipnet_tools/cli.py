@@ -24,6 +24,8 @@ EXAMPLES = """examples:
 
 EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster", "mujoco": "judge"}
 """Libraries that a plain installation lacks, and the extra that installs each."""
+OWN_EXTRAS = {"generate": "generate"}
+"""Verbs whose libraries an extra of their own installs."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -67,9 +69,10 @@ def _guarded(name: str, rest: list[str]) -> int:
     except KeyboardInterrupt:
         return 130
     except ModuleNotFoundError as error:
-        if error.name not in EXTRAS:
+        if error.name not in EXTRAS and name not in OWN_EXTRAS:
             raise
-        remedy = f"{error.name} is not installed: python -m pip install 'manipnet-live[{EXTRAS[error.name]}]'"
+        extra = OWN_EXTRAS.get(name) or EXTRAS[error.name or ""]
+        remedy = f"{error.name} is not installed: python -m pip install 'manipnet-live[{extra}]'"
         print(f"manipnet {name}: {remedy}", file=sys.stderr)
     except BrokenPipeError:
         raise

@@ -101,6 +101,15 @@ VERBS = {
             "bvh gloves --mesh Mug=mug.obj --out DATA         folders of a studio's own glove takes",
         ),
     ),
+    "generate": Verb(
+        "make takes for training out of nothing: free hands, objects and motions",
+        "manipnet_tools.generate.command",
+        "manipnet_tools.generate.options.GenerateOptions",
+        (
+            "--out generated --hours 4                        on all processors; run it again to continue",
+            "--out generated --hours 40 --ray 192.168.1.7:6379      on a Ray cluster",
+        ),
+    ),
     "train": Verb(
         "train a model on captured takes",
         "manipnet_tools.training.train",

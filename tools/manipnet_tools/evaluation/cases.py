@@ -97,7 +97,7 @@ def load_case(take: Take, data: Path) -> Case:
         objects = ", ".join(take.objects) or "none"
         raise DataError(f"{take.name}: needs one object and the fingers of both hands; its objects are {objects}")
     name = take.objects[0]
-    subject, shape, ticks = shipped_hand(), load_shape(mesh_file(data, name)), tick_take(take)
+    subject, shape, ticks = take.hand or shipped_hand(), load_shape(mesh_file(data, name)), tick_take(take)
     body, T_world_object = physics.body_of(shape), ticks.bodies[name].poses
     world: dict[Side, Array] = {side: captured_at(take, side, ticks.time_s) for side in SIDES}
     return Case(

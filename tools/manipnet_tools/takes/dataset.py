@@ -1,7 +1,9 @@
-"""The folder of the ManipNet dataset: takes in `BVH/<take>/`, meshes in `meshes/`."""
+"""The folder of a dataset: takes in `BVH/<take>/` or generated ones in `takes/<take>/`, meshes in `meshes/`."""
 
 from collections.abc import Sequence
 from pathlib import Path
+
+from manipnet_tools.takes.take_file import TAKE_FILE
 
 
 class DataError(ValueError):
@@ -11,8 +13,11 @@ class DataError(ValueError):
 def take_folders(data: Path, names: Sequence[str] = ()) -> list[Path]:
     """The folders of all takes, or of the takes in `names`. Raises `DataError`."""
     folders = sorted(path for path in (data / "BVH").glob("*") if path.is_dir())
+    folders += sorted(path.parent for path in (data / "takes").glob(f"*/{TAKE_FILE}"))
     if not folders:
-        raise DataError(f"{data}: contains no takes; it must have folders BVH/<take>/ with BVH files")
+        raise DataError(
+            f"{data}: contains no takes; it must have folders BVH/<take>/ with BVH files, or takes/<take>/{TAKE_FILE}"
+        )
     found = {path.name: path for path in folders}
     if unknown := set(names) - found.keys():
         raise DataError(f"{data}: has no take {', '.join(sorted(unknown))}; it has {', '.join(sorted(found))}")

@@ -12,14 +12,18 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from manipnet.geometry import Array
+from manipnet.geometry import SIDES, Array
 from manipnet.recording.mcap_file import RecordingError, read_bodies
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.synthesizer import hand_to_world
 from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.takes.body_names import AmbiguousNameError, take_names
 from manipnet_tools.takes.bvh_folder import read_bvh_folder
 from manipnet_tools.takes.bvh_motion import BvhError
 from manipnet_tools.takes.motive_csv import read_motive_csv
 from manipnet_tools.takes.motive_table import MotiveCsvError
+from manipnet_tools.takes.take_file import TAKE_FILE, TakeFileError, read_take_file
 from manipnet_tools.takes.timecode_track import TimecodeTrack
 from manipnet_tools.takes.trajectory import TrajectoryError, read_trajectory
 
@@ -62,6 +66,8 @@ class Take:
     """Objects are where the centres of their bounding boxes are, not where their meshes' origins are."""
     timecode: TimecodeTrack | None = None
     """If the tracker sent one."""
+    hand: Hand | None = None
+    """The hand that the fingers are of, if the take has its own; otherwise that of the dataset's subject."""
 
     @property
     def objects(self) -> tuple[str, ...]:
@@ -70,7 +76,7 @@ class Take:
 
 
 def read_take(path: Path | str, keep: Collection[str] = (), up: Literal["y", "z"] = "y") -> Take:
-    """Read a take: a folder of BVH files, a trajectory text, a Motive CSV or a recording.
+    """Read a take: a folder of BVH files or of a generated take, a trajectory text, a Motive CSV or a recording.
 
     Bodies of a Motive CSV that are called like a wrist get its name, except for the names in `keep`. `up` is the axis
     that points up in a Motive CSV or a recording. Raises `TakeError`.
@@ -92,7 +98,7 @@ def read_take(path: Path | str, keep: Collection[str] = (), up: Literal["y", "z"
         raise TakeError(f"{path}: --up z is for {' and '.join(TRACKED_FORMATS)} files; this format has its own up axis")
     try:
         take = readers[kind](path)
-    except (BvhError, TrajectoryError, MotiveCsvError, RecordingError) as error:
+    except (BvhError, TrajectoryError, MotiveCsvError, RecordingError, TakeFileError) as error:
         raise TakeError(str(error)) from None
     except (AmbiguousNameError, OSError) as error:
         raise TakeError(f"{path}: {error}") from None
@@ -109,6 +115,8 @@ def _unknown(suffix: str) -> str:
 
 
 def _read_folder(folder: Path) -> Take:
+    if (folder / TAKE_FILE).is_file():
+        return _read_generated(folder)
     read = read_bvh_folder(folder)
     fingers = {side: Fingers(*hand) for side, hand in read.hands.items()}
     tracks = {
@@ -119,6 +127,18 @@ def _read_folder(folder: Path) -> Take:
     seen = np.ones(frames, dtype=np.bool_)
     bodies = {name: BodyTrack(poses, seen) for name, poses in tracks.items()}
     return Take(folder.name, read.rate_hz, np.arange(frames) / read.rate_hz, bodies, fingers)
+
+
+def _read_generated(folder: Path) -> Take:
+    take, hand = read_take_file(folder)
+    seen = np.ones(len(take.object), dtype=np.bool_)
+    tracks = {f"{side}_wrist": take.wrists[side] for side in SIDES} | {take.object_name: take.object}
+    fingers = {}
+    for side in SIDES:
+        positions, rotations = hand_to_world(side, take.wrists[side], *forward_kinematics(hand, take.angles[side]))
+        fingers[side] = Fingers(positions, rotations)
+    bodies = {name: BodyTrack(poses, seen) for name, poses in tracks.items()}
+    return Take(folder.name, take.rate_hz, np.arange(len(seen)) / take.rate_hz, bodies, fingers, hand=hand)
 
 
 def _read_trajectory(path: Path) -> Take:

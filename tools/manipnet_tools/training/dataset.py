@@ -47,7 +47,7 @@ class CapturedHand:
 
     name: str
     hand: Hand
-    """The hand of the captured subject."""
+    """The hand of the captured subject, or that of a generated take."""
     shape: Shape
     mirrored: bool
     wrist: Array
@@ -104,7 +104,7 @@ def continuous(poses: Array) -> Array:
 
 def captured_hands(take: Take, shapes: dict[str, Shape], sides: Sequence[Side] = SIDES) -> list[CapturedHand]:
     """The hands of a take with captured fingers, each with the object that it handles; `shapes` by object name."""
-    subject = shipped_hand()
+    subject = take.hand or shipped_hand()
     hands = []
     pairs: tuple[tuple[Side, Side], ...] = (("right", "left"), ("left", "right"))
     for side, other in pairs:

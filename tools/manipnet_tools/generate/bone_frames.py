@@ -1,0 +1,41 @@
+"""The same hand with other frames of its bones, for networks that learn from two hands.
+
+A network sees and answers rotations of bones, so hands whose frames are laid differently look different to it although
+they move alike. Only mixtures with captured takes need this; a set of generated takes does not.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from manipnet.geometry import Array, matrix_to_quat
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+
+
+def in_frames_of(hand: Hand, other: Hand) -> Hand:
+    """The hand with the frames that the bones of another hand of the same layout have when all angles are zero.
+
+    Joints, hinges, skin and sensors stay where they are, and so do the angles of every pose.
+    """
+    own, others = (forward_kinematics(each, np.zeros(each.angle_count))[1] for each in (hand, other))
+    turns = np.swapaxes(own, 1, 2) @ others  # from each bone's new frame to its old one
+    turns[0] = np.eye(3)
+    parents = hand.parents[: hand.bone_count]
+    above = np.where(parents < 0, 0, parents)
+    rest = hand.skeleton.rest
+    quats = matrix_to_quat(np.einsum("bji,bjk,bkl->bil", turns[above], rest, turns))
+    sensors = hand.sensors
+    return replace(
+        hand,
+        offsets=_into(turns[np.maximum(hand.parents, 0)], hand.offsets),
+        rest_quats=quats,
+        axes=_into(turns[above[hand.angle_bones]], hand.axes),
+        sensors=sensors._replace(
+            points=_into(turns[sensors.bones], sensors.points), normals=_into(turns[sensors.bones], sensors.normals)
+        ),
+    )
+
+
+def _into(turns: Array, vectors: Array) -> Array:
+    return np.einsum("...ji,...j->...i", turns, vectors)

@@ -1,0 +1,74 @@
+"""Hands of other proportions, made from the free hand."""
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from manipnet.geometry import Array
+from manipnet.synthesis.hand.hand import Hand, Indices
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+
+HANDS: Final = 16
+"""How many hands a set is made with; the first is the free hand itself."""
+_SPREAD: Final = 0.15
+
+
+@dataclass(frozen=True)
+class Proportions:
+    """Relative to the free hand: the size of everything, the length of the fingers, and the thickness."""
+
+    size: float = 1.0
+    fingers: float = 1.0
+    thickness: float = 1.0
+
+
+def drawn_proportions(number: int, seed: int) -> Proportions:
+    """The proportions of one of the `HANDS`."""
+    if number == 0:
+        return Proportions()
+    rng = np.random.default_rng([seed, 7, number])
+    size = 1.0 + _SPREAD * float(np.clip(rng.normal(0.0, 0.5), -1.0, 1.0))
+    fingers, thickness = (1.0 + 0.1 * float(rng.uniform(-1.0, 1.0)) for _ in range(2))
+    return Proportions(round(size, 3), round(fingers, 3), round(thickness, 3))
+
+
+def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
+    """The hand with other proportions; skin and sensors follow the bones.
+
+    Bones of fingers become longer along themselves, and everything at right angles to a bone becomes thicker.
+    """
+    long = np.ones(hand.joint_count)
+    for finger in hand.fingers:
+        long[list(finger[-3:])] = proportions.fingers
+    offsets = proportions.size * long[:, None] * hand.offsets
+    radii = proportions.size * proportions.thickness * hand.radii
+    changed = replace(hand, name=name, offsets=offsets, radii=radii)
+    before, turns = forward_kinematics(hand, hand.skin.bind_angles)
+    after, _ = forward_kinematics(changed, hand.skin.bind_angles)
+    child = np.zeros(hand.bone_count, dtype=int)
+    for finger in hand.fingers:
+        child[list(finger[:-1])] = finger[1:]
+    child[0] = hand.fingers[2][0]
+    along = before[child] - before[: hand.bone_count]
+    along = np.einsum("bji,bj->bi", turns, along / np.linalg.norm(along, axis=1, keepdims=True))  # in each bone's frame
+    stretch = np.array([long[child[bone]] if bone else 1.0 for bone in range(hand.bone_count)])
+
+    def grown(points: Array, bones: Indices) -> Array:
+        """Points in the frames of their bones `(..., 3)`."""
+        direction = along[bones]
+        reach = np.sum(points * direction, axis=-1, keepdims=True)
+        aside = points - reach * direction
+        thick = np.where(bones == 0, 1.0, proportions.thickness)[..., None]
+        return proportions.size * (stretch[bones][..., None] * reach * direction + thick * aside)
+
+    skin, sensors = hand.skin, hand.sensors
+    local = np.einsum("vkji,vkj->vki", turns[skin.bones], skin.vertices[:, None] - before[skin.bones])
+    placed = after[skin.bones] + np.einsum("vkij,vkj->vki", turns[skin.bones], grown(local, skin.bones))
+    vertices = np.sum(skin.weights[..., None] * placed, axis=1)
+    center = offsets[8] + (sensors.grid_center - hand.offsets[8])
+    return replace(
+        changed,
+        skin=skin._replace(vertices=vertices),
+        sensors=sensors._replace(points=grown(sensors.points, sensors.bones), grid_center=center),
+    )
