@@ -3,8 +3,8 @@
     <CaptureStart><Name VALUE="Take 1"/><Notes VALUE="…"/><TimeCode VALUE="10:00:00:00"/><PacketID VALUE="7"/>…
     <CaptureStop><Name VALUE="Take 1"/>…
 
-Source: help.vicon.com, "UDP capture broadcast/trigger". No public specification of what Motive adds was found, so unknown
-elements are ignored, and the order and case of names do not matter.
+Source: help.vicon.com, "UDP capture broadcast/trigger". No public specification of what Motive adds was found, so
+unknown elements are ignored, and the order and case of names do not matter.
 """
 
 from typing import Final

@@ -21,9 +21,9 @@ SIDES: Final = np.concatenate([np.eye(3), -np.eye(3)])
 def cone_columns(points: Array, normals: Array, centre: Array, friction: float = FRICTION) -> Array:
     """Wrenches `(6, 4 n)` of unit pushes at `points (n, 3)` into the object, whose surface looks along `normals`."""
     helper = np.where(np.abs(normals[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
-    u = np.cross(normals, helper)
+    u: Array = np.cross(normals, helper)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(normals, u)
+    v: Array = np.cross(normals, u)
     forces = np.stack([-normals + friction * side for side in (u, -u, v, -v)], axis=1)
     torques = np.cross((points - centre)[:, None], forces) / ARM_M
     return np.concatenate([forces, torques], axis=2).reshape(-1, 6).T

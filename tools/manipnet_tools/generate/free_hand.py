@@ -14,9 +14,10 @@ import argparse
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from trimesh.remesh import subdivide_loop
 
@@ -74,7 +75,7 @@ class _Measured:
     """The mesh in the wrist frame, with joints where a hand has them."""
 
     vertices: Array
-    faces: Array
+    faces: NDArray[np.int64]
     weights: Array
     joints: Array
     """`(5, 4, 3)`"""
@@ -82,7 +83,7 @@ class _Measured:
 
 def _measured(mesh: HandMesh) -> _Measured:
     x = _unit(mesh.joints[2, 0] - mesh.wrist)
-    z = _unit(np.cross(x, mesh.joints[1, 0] - mesh.joints[4, 0]))
+    z = _unit(np.asarray(np.cross(x, mesh.joints[1, 0] - mesh.joints[4, 0]), np.float64))
     to_wrist = np.stack([x, np.cross(z, x), z])
     points, faces = mesh.vertices, mesh.faces
     points, faces, weights = _finer(points, faces, mesh.weights)
@@ -98,12 +99,12 @@ def _measured(mesh: HandMesh) -> _Measured:
     return _Measured(vertices, faces, weights, joints)
 
 
-def _finer(points: Array, faces: Array, weights: Array) -> tuple[Array, Array, Array]:
+def _finer(points: Array, faces: NDArray[np.integer[Any]], weights: Array) -> tuple[Array, NDArray[np.int64], Array]:
     """The mesh with every triangle divided into four, smoothly, and the weights with it."""
     columns = np.concatenate([points, weights, np.zeros((len(points), 2))], axis=1)
     parts = [subdivide_loop(columns[:, k : k + 3], faces, iterations=1) for k in range(0, columns.shape[1], 3)]
     weights = np.clip(np.concatenate([part[0] for part in parts[1:]], axis=1)[:, :16], 0.0, None)
-    return parts[0][0], parts[0][1], weights / weights.sum(axis=1, keepdims=True)
+    return np.asarray(parts[0][0]), np.asarray(parts[0][1], np.int64), weights / weights.sum(axis=1, keepdims=True)
 
 
 def _centred(vertices: Array, weights: Array, chain: Array, digit: int) -> Array:

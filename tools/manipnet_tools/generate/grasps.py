@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet_tools.generate.contact import Space, distance_of, look, score_rows, settle
@@ -39,7 +40,7 @@ class Grasp:
     angles: Array
     along: Array
     """`(3,)` the direction in which the hand arrives."""
-    touching: Array
+    touching: NDArray[np.bool_]
     """`(C,)` the capsules that touch."""
     downs: Array
     """`(n, 3)` the directions of gravity in which it holds."""
@@ -152,8 +153,8 @@ def _settled(
         return None, "fingers overlap"
     if not _arm_free(space, turned, moved):
         return None, "arm or palm inside"
-    touching = gaps < TOUCH_M
-    digits = touching[4:].reshape(5, 3).any(axis=1)
+    touching = np.asarray(gaps < TOUCH_M)
+    digits: NDArray[np.bool_] = np.any(touching[4:].reshape(5, 3), axis=1)
     if not all(digits[f] for f in proposal.needed):
         return None, "a needed digit does not touch"
     on_surface = points[touching] - normals[touching] * (gaps + hand.radii)[touching, None]

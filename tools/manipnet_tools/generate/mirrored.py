@@ -17,8 +17,15 @@ _FLIP: Final = np.array([-1.0, 1.0, 1.0])
 class Surface(Protocol):
     """What the search of grasps asks of a shape."""
 
-    center_of_mass: Array
-    inertia: Array
+    @property
+    def center_of_mass(self) -> Array:
+        """`(3,)` as `Shape.center_of_mass`."""
+        ...
+
+    @property
+    def inertia(self) -> Array:
+        """`(3, 3)` as `Shape.inertia`."""
+        ...
 
     def trace(self, origins: Array, directions: Array) -> Array:
         """Distances to the first hit, as `Shape.trace`."""

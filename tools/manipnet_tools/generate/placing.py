@@ -39,4 +39,4 @@ def shifted(by: Array) -> Array:
 
 
 def rotated(axis: Array, angle: float) -> Array:
-    return trimesh.transformations.rotation_matrix(angle, axis)
+    return np.asarray(trimesh.transformations.rotation_matrix(angle, axis))
