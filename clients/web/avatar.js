@@ -11,6 +11,7 @@ const TIP_SHARE = 0.8; // the last bone of a finger relative to the one before, 
 const THUMB_BEHIND = 0.08;
 const KNUCKLES_OFF_M = 0.05;
 const RADIUS_SHARES = [0.5, 1.7];
+const MEASURED = [0.3, 0.9]; // the part of a bone where its radius is measured; nearer to its joints, the skin bulges into the palm or ends
 const PALMAR = 0.6; // cosine of the largest angle between the direction of the palm and that in which a radius is measured
 const MODEL_PALM_M = 0.107;
 const NEAR_M = 1e-3;
@@ -239,7 +240,8 @@ function radiusOf(skin, start, end, palmar, guess) {
   const along = unit(sub(end, start));
   const length = norm(sub(end, start));
   const own = skin.map((point) => sub(point, start));
-  const middle = own.filter((point) => dot(point, along) > 0.1 * length && dot(point, along) < 0.9 * length);
+  const isMeasured = (at) => at > MEASURED[0] * length && at < MEASURED[1] * length;
+  const middle = own.filter((point) => isMeasured(dot(point, along)));
   const facing = facingPalm(middle.map((point) => sub(point, times(dot(point, along), along))), palmar);
   if (middle.length < 6 || facing.length === 0) return null;
   const radius = median(facing.map(norm));

@@ -31,7 +31,12 @@ controls.target.set(0, 1, 0);
 
 const hands = Object.fromEntries(Object.entries(SIDES).map(([side, color]) => [side, makeHand(color)]));
 const bodies = new Map();
-let hasLooked = false;
+const VIEW_FROM = new THREE.Vector3(-0.16, 0.48, 0.86); // the direction from the hands to the camera
+const MARGIN_M = 0.05; // of skin about the joints
+const CATCH_UP = 0.05; // the share of its way that the camera goes in one frame, so that it follows without shaking
+const box = new THREE.Box3();
+let [hasLooked, visitorLooks, distance] = [false, false, 0];
+controls.addEventListener("start", () => (visitorLooks = true));
 let problem = "";
 
 /** A ball at each joint and a limb along each bone; the palm is a limb to each knuckle. */
@@ -104,19 +109,22 @@ function makeBody(name) {
   return group;
 }
 
-/** Points the camera at all hands once, because the origin may be far from them, from where both fit into the page. */
-function lookAtHands({ left, right }) {
+/** Keeps all hands in view, wherever they are, until the visitor moves the camera. */
+function followHands({ left, right }) {
   const present = [left, right].filter((hand) => hand.present);
-  if (hasLooked || present.length === 0) return;
-  hasLooked = true;
-  const box = new THREE.Box3();
+  if (visitorLooks || renderer.xr.isPresenting || present.length === 0) return;
+  box.makeEmpty();
   for (const hand of present) {
     for (let i = 0; i < JOINT_PARENTS.length; i++) box.expandByPoint(end.fromArray(hand.joints, 7 * i));
   }
-  box.getCenter(controls.target);
-  const radius = 0.5 * box.getSize(size).length() + 0.05;
+  box.getCenter(middle);
   const half = Math.min(1, camera.aspect) * Math.tan((camera.fov * Math.PI) / 360);
-  camera.position.copy(controls.target).add(middle.set(-0.16, 0.48, 0.86).multiplyScalar((1.2 * radius) / half));
+  const wanted = (1.2 * (0.5 * box.getSize(size).length() + MARGIN_M)) / half;
+  const share = hasLooked ? CATCH_UP : 1;
+  distance += share * (wanted - distance);
+  controls.target.lerp(middle, share);
+  camera.position.copy(controls.target).addScaledVector(VIEW_FROM, distance);
+  hasLooked = true;
 }
 
 /** Shows the avatar of a GLB or VRM file, and lets the server solve on its hands. */
@@ -157,6 +165,13 @@ function describe() {
   return [`${s.state} · ${s.rateHz.toFixed(1)} Hz · ${age} · ${s.lost} lost`, ...states, s.problem, problem].join("\n");
 }
 
+/** Shows the button to enter VR, unless there is no headset. */
+function offerVR(isSupported) {
+  if (!isSupported) return;
+  renderer.xr.enabled = true;
+  document.body.append(VRButton.createButton(renderer));
+}
+
 function resize() {
   renderer.setSize(innerWidth, innerHeight);
   camera.aspect = innerWidth / innerHeight;
@@ -169,7 +184,7 @@ function draw() {
     for (const side of Object.keys(SIDES)) showHand(hands[side], client.hands[side], balls(side));
     if (avatar !== null && client.weight > 0) avatar.rig.show(client.hands);
     for (let i = 0; i < client.hands.bodyCount; i++) showBody(client.hands.bodies[i]);
-    lookAtHands(client.hands);
+    followHands(client.hands);
   }
   controls.update();
   renderer.render(scene, camera);
@@ -180,10 +195,7 @@ addEventListener("resize", resize);
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", dropped);
 if (parameters.has("avatar")) showAvatar(parameters.get("avatar"), "avatar");
-if (navigator.xr) {
-  renderer.xr.enabled = true;
-  document.body.append(VRButton.createButton(renderer));
-}
+navigator.xr?.isSessionSupported("immersive-vr").then(offerVR, () => offerVR(false)); // a page may be forbidden to ask
 setInterval(() => (status.textContent = describe()), 250);
 resize();
 renderer.setAnimationLoop(draw); // at the rate of the headset, in VR

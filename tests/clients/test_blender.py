@@ -92,7 +92,7 @@ def test_a_profile_is_that_of_the_exported_file(rig: str, extensions: Path, tmp_
         np.testing.assert_allclose(ours.hands[side].joints[:, :3], theirs.hands[side].joints[:, :3], atol=5e-4)
         same = np.abs(np.sum(ours.hands[side].joints[:, 3:] * theirs.hands[side].joints[:, 3:], axis=1))
         assert np.nanmin(same) > 0.9999, told
-        np.testing.assert_allclose(ours.hands[side].radii, theirs.hands[side].radii, atol=1.5e-3)  # of few points
+        np.testing.assert_allclose(ours.hands[side].radii, theirs.hands[side].radii, atol=5e-5)
         assert not np.isnan(ours.hands[side].radii[[7, 12, 17, 22]]).any()
 
 

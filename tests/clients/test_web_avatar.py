@@ -84,7 +84,7 @@ def compare(ours, theirs) -> None:
         a, b = ours.hands[side], theirs.hands[side]
         np.testing.assert_allclose(a.joints[:, :3], b.joints[:, :3], atol=5e-4)
         assert np.nanmin(np.abs(np.sum(a.joints[:, 3:] * b.joints[:, 3:], axis=1))) > 0.9999
-        np.testing.assert_allclose(a.radii, b.radii, atol=5e-4)
+        np.testing.assert_allclose(a.radii, b.radii, atol=5e-5)
 
 
 def test_arms_reach_the_wrist_and_keep_their_lengths() -> None:
@@ -119,7 +119,8 @@ def test_fingertips_lie_where_the_server_says(performing: str, tmp_path: Path) -
         for word, row in zip(WORDS, FINGERS, strict=True)
     ]
     result = in_node("tips", str(file), "{}", performing, json.dumps(tips))
-    assert np.percentile(result["far"], 75) < 1e-3, result
+    assert max(result["arrived"]) < 1e-3, result
+    assert max(result["shown"]) < 1e-3, result
 
 
 def test_a_refusal_has_the_reason_of_the_server(performing: str, tmp_path: Path) -> None:

@@ -54,10 +54,10 @@ def find_hand(armature: bpy.types.Object, side: str, bone_map: Mapping[str, str]
     if hand is None or len(knuckles) - knuckles.count(None) < 2:
         missing = [part for part in ("Hand", *FINGER_PARTS) if found.get(part) is None]
         raise RigError(f"{armature.name} has no bone for {', '.join(missing)} of the {side} hand")
-    known = {bone.name: [hand_bone.name for hand_bone in bone.parent_recursive] for bone in armature.data.bones}
-    if not known[hand] and not any(known[bone] for bone in fingers if bone is not None):
+    loose = [name for name in fingers if name is not None and armature.data.bones[name].parent is None]
+    if loose:
         raise RigError(
-            f"the finger bones of {armature.name} have no parents, so they cannot follow the hand; parent them"
+            f"{', '.join(loose)} of {armature.name} have no parent, so they cannot follow the hand; parent them"
         )
     return HandBones(hand, fingers, _control(armature, side), _metacarpals(armature, side))
 

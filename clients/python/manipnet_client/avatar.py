@@ -33,6 +33,8 @@ _TIP_SHARE = 0.8
 _THUMB_BEHIND = 0.08
 _KNUCKLES_OFF_M = 0.05
 _RADIUS_SHARES = (0.5, 1.7)
+_MEASURED = (0.3, 0.9)
+"""Between which parts of a bone its radius is measured; nearer to its joints, the skin bulges into the palm or ends."""
 _PALMAR = 0.6
 """Cosine of the largest angle between the direction of the palm and that in which a radius is measured."""
 _MODEL_PALM_M = 0.107
@@ -225,7 +227,7 @@ def _radius(skin: np.ndarray, start: np.ndarray, end: np.ndarray, palmar: np.nda
     along = end - start
     own = skin - start
     at = own @ along / max(float(along @ along), 1e-18)
-    middle = (own - at[:, None] * along)[(at > 0.1) & (at < 0.9)]
+    middle = (own - at[:, None] * along)[(at > _MEASURED[0]) & (at < _MEASURED[1])]
     facing = _facing(middle, palmar)
     if len(middle) < 6 or not facing.any():
         return np.nan

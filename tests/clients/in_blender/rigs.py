@@ -73,6 +73,7 @@ def skin(rig, names, radius_m=0.008):
         groups.append((name, list(range(first, first + 49))))
     data = bpy.data.meshes.new("Skin")
     data.from_pydata(points, [], faces)
+    data.shade_smooth()  # a flat face has vertices of its own in an exported file, and more of them move medians
     made = bpy.data.objects.new("Skin", data)
     bpy.context.scene.collection.objects.link(made)
     for name, indices in groups:

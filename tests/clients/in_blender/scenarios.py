@@ -160,6 +160,23 @@ def an_armature_without_hands_is_refused_by_name():
     assert threading.active_count() == 1
 
 
+def fingers_without_parents_are_refused():
+    for loosened in (FINGERS, ("Index",)):
+        for parts in ((1, 2, 3), (1,)):
+            rig = armature(arms=True)
+            bpy.ops.object.mode_set(mode="EDIT")
+            for finger in loosened:
+                for part in parts:
+                    rig.data.edit_bones[f"LeftHand{finger}{part}"].parent = None
+                    rig.data.edit_bones[f"RightHand{finger}{part}"].parent = None
+            bpy.ops.object.mode_set(mode="OBJECT")
+            with refused(RigError, f"LeftHand{loosened[0]}1"):
+                start(Cast("Anna", rig))
+            with refused(RigError, "have no parent, so they cannot follow the hand; parent them"):
+                start(Cast("Anna", rig))
+            bpy.data.objects.remove(rig)
+
+
 def a_bone_map_serves_bones_with_any_name():
     rig = armature(rename=lambda name: "b" + name[::-1])
     parts = ("Proximal", "Intermediate", "Distal")
