@@ -1,8 +1,10 @@
 // The parts of three.js that the example page uses, without drawing; with it the page runs without a network.
+const NUMBERS = [Symbol.toPrimitive, "length"]; // the methods that return numbers
+
 class Anything {
   constructor() {
     return new Proxy(function () {}, {
-      get: (target, key) => (key === Symbol.toPrimitive ? () => 0 : (target[key] ??= new Anything())),
+      get: (target, key) => (NUMBERS.includes(key) ? () => 0 : (target[key] ??= new Anything())),
       set: (target, key, value) => ((target[key] = value), true),
       apply: () => new Anything(),
     });
