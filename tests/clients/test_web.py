@@ -58,6 +58,19 @@ def test_example_page_shows_the_token_of_its_address(pages, tmp_path):
             page.wait_for(f"{status}.startsWith('connected')")
 
 
+def test_only_a_page_with_a_headset_has_the_button_to_enter_vr(pages, tmp_path):
+    (chromium,) = need("chromium")
+    buttons = "document.querySelectorAll('button').length"
+    with browsing(chromium, f"{pages}/example.html?server=ws://127.0.0.1:1", tmp_path / "profile") as page:
+        page.wait_for("Number(document.body.dataset.frames) > 10")
+        assert page.evaluate(buttons) == 0
+        page.call("Page.enable")
+        with_headset = "navigator.xr.isSessionSupported = async (mode) => mode === 'immersive-vr'"
+        page.call("Page.addScriptToEvaluateOnNewDocument", source=with_headset)
+        page.call("Page.reload")
+        page.wait_for(f"{buttons} === 1")
+
+
 PACKED = """
 const { execFileSync } = require("child_process");
 const { mkdtempSync, writeFileSync } = require("fs");
