@@ -469,13 +469,14 @@ int Idle(const std::string& address) {
 
 }  // namespace
 
-void* operator new(std::size_t size) {
+// Not inlined: some compilers believe that a new of their own does not match this delete when only one of them is.
+__attribute__((noinline)) void* operator new(std::size_t size) {
     ++Allocations;
     if (void* memory = std::malloc(size)) return memory;
     std::abort();
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+__attribute__((noinline)) void operator delete(void* memory) noexcept { std::free(memory); }
+__attribute__((noinline)) void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 int main(int count, char** words) {
     const std::string verb = count > 1 ? words[1] : "";

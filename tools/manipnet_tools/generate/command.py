@@ -20,8 +20,9 @@ from manipnet_tools.generate.proportions import HANDS
 from manipnet_tools.generate.sheet import write_grasp_sheet
 from manipnet_tools.generate.statistics import print_statistics, statistics
 from manipnet_tools.importing.dataset_writer import write_mesh
+from manipnet_tools.takes.dataset import TAKE_FILE
 from manipnet_tools.takes.sources import TakeSource, add_sources
-from manipnet_tools.takes.take_file import TAKE_FILE, write_take_file
+from manipnet_tools.takes.take_file import write_take_file
 from manipnet_tools.terminal import open_console
 
 SET_FILE: Final = "generate.json"

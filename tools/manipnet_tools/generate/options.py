@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Final
 
-from tyro.conf import arg
-
 from manipnet.common.options import ConfigError
+from manipnet_tools.commands.arguments import arg
 
 MOST_HOURS: Final = 800.0
 """So many takes have names of five digits."""

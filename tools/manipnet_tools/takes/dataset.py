@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
-from manipnet_tools.takes.take_file import TAKE_FILE
+TAKE_FILE: Final = "take.npz"
+"""The file of a generated take."""
 
 
 class DataError(ValueError):

@@ -21,9 +21,10 @@ from manipnet.wire.bodies import BodyFrame
 from manipnet_tools.takes.body_names import AmbiguousNameError, take_names
 from manipnet_tools.takes.bvh_folder import read_bvh_folder
 from manipnet_tools.takes.bvh_motion import BvhError
+from manipnet_tools.takes.dataset import TAKE_FILE
 from manipnet_tools.takes.motive_csv import read_motive_csv
 from manipnet_tools.takes.motive_table import MotiveCsvError
-from manipnet_tools.takes.take_file import TAKE_FILE, TakeFileError, read_take_file
+from manipnet_tools.takes.take_file import TakeFileError, read_take_file
 from manipnet_tools.takes.timecode_track import TimecodeTrack
 from manipnet_tools.takes.trajectory import TrajectoryError, read_trajectory
 

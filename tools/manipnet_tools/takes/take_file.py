@@ -16,8 +16,8 @@ from manipnet.geometry import SIDES, Array, Side
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.hand_file import read_hand
 from manipnet.synthesis.hand.validation import HandError
+from manipnet_tools.takes.dataset import TAKE_FILE
 
-TAKE_FILE: Final = "take.npz"
 FORMAT: Final = 1
 
 
@@ -64,7 +64,7 @@ def read_take_file(folder: Path) -> tuple[GeneratedTake, Hand]:
     """A take and the hand that it is of. Raises `TakeFileError`."""
     path = folder / TAKE_FILE
     try:
-        with np.load(path, allow_pickle=False) as content:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as content:
             arrays = dict(content)
         if int(arrays["format"]) != FORMAT:
             raise TakeFileError(f"{path}: is a take of format {int(arrays['format'])}; this version reads {FORMAT}")
