@@ -2,6 +2,12 @@
 
 from studio import FOLLOWING, PATIENCE_S, STAGE, TEXT, Studio
 
+MAIN_TABS = "[...document.querySelectorAll('[role=tab]')].filter(one => one.textContent !== 'Health')"
+TABS = f"{MAIN_TABS}.map(one => one.getBoundingClientRect().top)"
+"""Where the tabs of the controls begin, from the top."""
+WIDE_TABS = f"{MAIN_TABS}.filter(one => one.getBoundingClientRect().right > innerWidth).length"
+"""How many tabs reach beyond the window."""
+
 
 def test_the_camera_is_taken_and_given_back(studio: Studio) -> None:
     page = studio.page
@@ -37,6 +43,8 @@ def test_a_tablet_shows_stage_and_controls_side_by_side(studio: Studio) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") == 768
     page.click("Takes", PATIENCE_S)
     page.wait_for(f"{TEXT}.includes('Record makes')", PATIENCE_S)
+    assert page.evaluate(f"new Set({TABS}).size") == 1, "the tabs wrap"
+    assert page.evaluate(WIDE_TABS) == 0
     page.call("Emulation.setDeviceMetricsOverride", width=1000, height=700, deviceScaleFactor=1, mobile=False)
     page.call("Page.reload")
     studio.says("● Live")
