@@ -1,7 +1,5 @@
 """Takes on the live page: recorded, shown, described, downloaded, renamed and deleted in a real browser."""
 
-import json
-
 from browser import another
 from studio import PATIENCE_S, SECOND, TEXT, Studio
 
@@ -57,24 +55,3 @@ def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
     page.click("Keep changes")
     studio.says("note kept")
     assert studio.server.ask({"op": "recordings"})["recording"] is None
-
-
-def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> None:
-    page = studio.page
-    page.click("Takes")
-    for name in ("b", "be"):
-        page.type("Name", name, enter=False)
-    assert studio.server.ask({"op": "recordings"})["recordings"] == ["12A take 1.mcap"]  # not renamed letter by letter
-    page.type("Name", "best of all")
-    studio.until(lambda _: (studio.takes / "best of all.mcap").exists())
-    notes = json.loads((studio.takes / "best of all.json").read_text())
-    assert notes == {"slate": "12A", "number": 1, "note": "ran r rr"}
-    page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(studio.rig.parent))
-    page.click("Download")
-    copy = studio.rig.parent / "best of all.mcap"
-    studio.until(lambda _: copy.exists() and copy.stat().st_size == (studio.takes / copy.name).stat().st_size)
-    page.click("Delete …")
-    page.click("Keep it", PATIENCE_S)
-    page.click("Delete …")
-    page.click("Delete it", PATIENCE_S)
-    studio.until(lambda _: not list(studio.takes.iterdir()))
