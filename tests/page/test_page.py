@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
-from browser import Page, browsing
+from browser import browsing
 from live_server import LiveServer, Sender, scene, serving
 
 from manipnet.page.web_server import may_act, may_look
@@ -64,10 +64,10 @@ def test_the_page_shows_hands_swaps_an_object_and_complains_of_nothing(demo: Liv
         page.evaluate(LISTEN)
         page.wait_for(f"{TEXT}.includes('hands/s') && document.title === 'ManipNet Live'", PATIENCE_S)
         page.wait_for(f"{FINGERS} && {TEXT}.includes('right_wrist')", PATIENCE_S)
-        drop(page, "club.ply", Path(__file__).parents[2] / "server/manipnet/synthesis/objects/meshes/hammer.ply")
+        page.drop("club.ply", Path(__file__).parents[2] / "server/manipnet/synthesis/objects/meshes/hammer.ply")
         page.wait_for("document.getElementById('drop-note').textContent.includes('carries club')", PATIENCE_S)
         assert "club" in {prop["object"] for prop in carried(demo).values()}
-        drop(page, "nonsense.obj", Path(__file__))
+        page.drop("nonsense.obj", Path(__file__))
         page.wait_for("document.getElementById('drop-note').textContent.includes('nonsense.obj')", PATIENCE_S)
         assert page.evaluate("window.complaints.join('; ') || 'none'") == "none"
     counters = demo.ask({"op": "status"})["counters"]
@@ -94,18 +94,6 @@ def test_the_page_says_what_is_wrong_with_what_arrives_and_what_to_do(tiny_bundl
             time.sleep(1 / 60)
         assert page.evaluate(f"{TEXT}.includes(\"name one of these in the rig: '<b>Right</b>'\")")
         sender.close()
-
-
-def drop(page: Page, name: str, file: Path) -> None:
-    """Drop a file on the page."""
-    content = list(file.read_bytes())
-    page.evaluate(
-        f"""(() => {{
-          const carried = new DataTransfer();
-          carried.items.add(new File([new Uint8Array({content})], "{name}"));
-          dispatchEvent(new DragEvent("drop", {{dataTransfer: carried}}));
-        }})()"""
-    )
 
 
 def test_other_web_sites_and_other_names_of_this_machine_are_turned_away(demo: LiveServer) -> None:

@@ -124,6 +124,17 @@ class Page:
         self.tick(label)
         self.press(self.wait_for(f"({_CENTER})({_BY_OPTION})({json.dumps(option)}, 0)"))
 
+    def drop(self, name: str, file: Path) -> None:
+        """Drop a file on the page under a name."""
+        content = list(file.read_bytes())
+        self.evaluate(
+            f"""(() => {{
+              const carried = new DataTransfer();
+              carried.items.add(new File([new Uint8Array({content})], "{name}"));
+              dispatchEvent(new DragEvent("drop", {{dataTransfer: carried}}));
+            }})()"""
+        )
+
     def screenshot(self, path: Path) -> None:
         """What the page looks like, as PNG."""
         path.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))

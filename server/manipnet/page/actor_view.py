@@ -80,9 +80,9 @@ class Stage:
             self._actors[actor] = ActorView(self._scene, f"{self._name}/actors/{actor}", self._look)
         return self._actors[actor]
 
-    def remove(self) -> None:
-        """Remove everything from the scene."""
-        self._root.remove()
+    def set_visible(self, visible: bool) -> None:
+        """Show or hide everything."""
+        self._root.visible = visible
 
     def settle(self) -> None:
         """Put the table below what the next frame shows."""

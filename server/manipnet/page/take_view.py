@@ -20,6 +20,12 @@ class TakeView:
     def __init__(self, client: viser.ClientHandle, look: HandLook, camera: FollowCamera) -> None:
         self._client, self._look, self._camera = client, look, camera
         self._stage: Stage | None = None
+        self._stages: dict[str, Stage] = {}
+        """The stage of the takes of each actor, which is hidden and never removed: viser's client 1.1.1 fails when a
+        whole tree is removed."""
+        self._live: viser.FrameHandle | None = None
+        """The visitor's own node above the live session. It is hidden and never removed: the browser would remove the
+        live session with it."""
         self._drawing = threading.Lock()
         self.recording: Recording | None = None
         """The recording that is shown instead of the live session."""
@@ -29,9 +35,15 @@ class TakeView:
         self.close()
         scene = self._client.scene
         with self._drawing, self._client.atomic():
-            self._live = scene.add_frame(LIVE, show_axes=False, visible=False)
-            self._stage = Stage(scene, TAKE, self._look)
-            self.recording = recording
+            if self._live is None:
+                self._live = scene.add_frame(LIVE, show_axes=False, visible=False)
+            self._live.visible = False
+            actor = recording.messages[0].actor
+            if actor not in self._stages:
+                self._stages[actor] = Stage(scene, f"{TAKE}/{len(self._stages)}", self._look)
+            self._stage, self.recording = self._stages[actor], recording
+            self._stage.settle()
+            self._stage.set_visible(True)
         self._camera.restart()
         self.seek(0.0)
 
@@ -49,7 +61,8 @@ class TakeView:
         with self._drawing, self._client.atomic():
             if self.recording is None or self._stage is None:
                 return
-            self._live.remove()
-            self._stage.remove()
+            if self._live is not None:
+                self._live.visible = True
+            self._stage.set_visible(False)
             self._stage = self.recording = None
         self._camera.restart()

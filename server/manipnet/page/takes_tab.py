@@ -33,10 +33,12 @@ class TakesTab:
         self._take = gui.add_dropdown("Take", (NONE,))
         self._facts = gui.add_markdown("")
         show = gui.add_button("Show this take", icon=viser.Icon.MOVIE)
-        self._name = gui.add_text("Name", "")
-        self._own_slate = gui.add_text("Its slate", "")
-        self._own_number = gui.add_number("Its number", 0, min=0, max=9999, step=1)
-        self._note = gui.add_text("Note", "", multiline=True)
+        with gui.add_form(None) as form:  # fields change with every letter, but a file must not be renamed so often
+            self._name = gui.add_text("Name", "")
+            self._own_slate = gui.add_text("Its slate", "")
+            self._own_number = gui.add_number("Its number", 0, min=0, max=9999, step=1)
+            self._note = gui.add_text("Note", "", multiline=True)
+            keep = gui.add_button("Keep changes", icon=viser.Icon.CHECK, hint="Enter, except in the note")
         download = gui.add_button("Download", icon=viser.Icon.DOWNLOAD)
         delete = gui.add_button("Delete …", icon=viser.Icon.TRASH, color="gray")
         show.on_click(lambda _: perform(self._show_take))
@@ -45,13 +47,8 @@ class TakesTab:
         self._take.on_update(by_visitor(self._show_facts))
         for handle in (self._slate, self._number):
             handle.on_update(by_visitor(self._name_next))
-        for key, handle in (
-            ("name", self._name),
-            ("slate", self._own_slate),
-            ("number", self._own_number),
-            ("note", self._note),
-        ):
-            handle.on_update(by_visitor(lambda key=key, handle=handle: perform(lambda: self._edit(key, handle.value))))
+        keep.on_click(lambda _: form.submit())
+        form.on_submit(lambda _: perform(self._edit))
 
     def refresh(self) -> None:
         """Offer the takes in the folder."""
@@ -102,20 +99,19 @@ class TakesTab:
     def _show_take(self) -> None:
         self._transport.show(read_recording(self._folder / self._chosen()["name"]))
 
-    def _edit(self, key: str, value: Any) -> str | None:
+    def _edit(self) -> str | None:
         take = self._chosen()
-        before = take["name"].removesuffix(".mcap") if key == "name" else take.get(key, 0 if key == "number" else "")
-        if value == before:
+        before = {"name": take["name"].removesuffix(".mcap"), "slate": "", "number": 0, "note": ""}
+        before |= {key: take[key] for key in ("slate", "number", "note") if key in take}
+        fields = {"name": self._name, "slate": self._own_slate, "number": self._own_number, "note": self._note}
+        changes = {key: field.value for key, field in fields.items() if field.value != before[key]}
+        if not changes:
             return None
-        try:
-            answer = self._ask(op="edit_recording", recording=take["name"], **{key: value})
-        except Exception:
-            self._show_facts()  # what was refused must not stay in the field
-            raise
+        answer = self._ask(op="edit_recording", recording=take["name"], **changes)
         self._look()
         self._take.value = answer["name"]
         self._show_facts()
-        return f"{answer['name']}: {key} is kept"
+        return f"{answer['name']}: {' and '.join(changes)} kept"
 
     def _download(self) -> str:
         take = self._chosen()

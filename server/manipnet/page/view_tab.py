@@ -25,7 +25,9 @@ class ViewTab:
     ) -> None:
         self._show, self._client, self._camera = show, client, camera
         self._dark = True
-        self._hidden: dict[str, viser.FrameHandle] = {}
+        self._nodes: dict[str, viser.FrameHandle] = {}
+        """The visitor's own node above each layer. It is hidden and never removed: the browser would remove what
+        others have drawn below it."""
         self._layers = frozenset[str]()
         gui = client.gui
         if operator:
@@ -43,7 +45,7 @@ class ViewTab:
         self._theme.on_click(lambda _: self._switch_theme())
         gui.add_markdown("**Layers**")
         for name, layer in OVERLAYS.items():
-            self._hide(name)
+            self._nodes[name] = client.scene.add_frame(f"{LAYERS}/{name}", show_axes=False, visible=False)
             box = gui.add_checkbox(layer.label, False)
             gui.add_html(legend(layer))
             box.on_update(lambda event, name=name: self._set_layer(name, event.target.value))
@@ -70,15 +72,7 @@ class ViewTab:
     def _set_layer(self, name: str, visible: bool) -> None:
         self._layers = self._layers | {name} if visible else self._layers - {name}
         self._show.want_layers(self._client.client_id, self._layers)
-        if visible and name in self._hidden:
-            self._hidden.pop(name).remove()
-        elif not visible:
-            self._hide(name)
-
-    def _hide(self, name: str) -> None:
-        """Hide a layer from this visitor, whoever else looks at it."""
-        if name not in self._hidden:
-            self._hidden[name] = self._client.scene.add_frame(f"{LAYERS}/{name}", show_axes=False, visible=False)
+        self._nodes[name].visible = visible
 
     def _switch_theme(self) -> None:
         self._dark = not self._dark

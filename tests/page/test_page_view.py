@@ -1,0 +1,53 @@
+"""What a visitor of the live page sees: camera, theme, and the layout on a tablet."""
+
+from studio import FOLLOWING, PATIENCE_S, STAGE, TEXT, Studio
+
+CONTROLS = ("View", "Objects", "Hands", "Takes", "Calibrate")
+MAIN_TABS = "[...document.querySelectorAll('[role=tab]')].filter(one => one.offsetParent)"
+TABS = f"{MAIN_TABS}.map(one => [one.textContent, one.getBoundingClientRect().top])"
+"""The tabs that are visible, and how far from the top they begin."""
+WIDE_TABS = f"{MAIN_TABS}.filter(one => one.getBoundingClientRect().right > innerWidth).length"
+"""How many tabs reach beyond the window."""
+
+
+def test_the_camera_is_taken_and_given_back(studio: Studio) -> None:
+    page = studio.page
+    page.click("View")
+    page.wait_for(f"{FOLLOWING}", PATIENCE_S)
+    x, y = page.evaluate(STAGE)
+    page.drag((x, y + 120), (x + 90, y + 150))
+    page.wait_for(f"!{FOLLOWING}", PATIENCE_S)
+    page.click("Follow the hands")
+    page.wait_for(f"{FOLLOWING}", PATIENCE_S)
+
+
+def test_the_theme_is_light_or_dark_and_remembered(studio: Studio) -> None:
+    page, scheme = studio.page, "document.documentElement.dataset.mantineColorScheme"
+    page.click("View")
+    page.wait_for(f"{scheme} === 'dark'", PATIENCE_S)
+    page.click("Light theme")
+    page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
+    page.call("Page.reload")
+    page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
+    page.click("Dark theme", PATIENCE_S)
+    page.wait_for(f"{scheme} === 'dark'", PATIENCE_S)
+
+
+def test_a_tablet_shows_stage_and_controls_side_by_side(studio: Studio) -> None:
+    page = studio.page
+    page.call("Emulation.setDeviceMetricsOverride", width=768, height=1024, deviceScaleFactor=1, mobile=True)
+    page.call("Page.reload")
+    studio.says("● Live")
+    page.wait_for(f"({STAGE})[0] > 0 && innerWidth === 768", PATIENCE_S)
+    width = page.wait_for("parseFloat(getComputedStyle(document.documentElement).getPropertyValue('--mn-width'))")
+    assert width > 350
+    assert page.evaluate("document.documentElement.scrollWidth") == 768
+    page.click("Takes", PATIENCE_S)
+    page.wait_for(f"{TEXT}.includes('Record makes')", PATIENCE_S)
+    tops = {name: top for name, top in page.evaluate(TABS) if name in CONTROLS}
+    assert tops.keys() == set(CONTROLS)
+    assert len(set(tops.values())) == 1, f"the tabs wrap: {tops}"
+    assert page.evaluate(WIDE_TABS) == 0
+    page.call("Emulation.setDeviceMetricsOverride", width=1000, height=700, deviceScaleFactor=1, mobile=False)
+    page.call("Page.reload")
+    studio.says("● Live")
