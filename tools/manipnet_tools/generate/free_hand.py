@@ -27,7 +27,8 @@ from manipnet.synthesis.hand.hand_file import read_hand, write_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet_tools.assets.hand_sdf import palmar_directions
 from manipnet_tools.assets.hand_surface import choose_sensors
-from manipnet_tools.generate.makehuman import Assets, HandMesh, default_adult
+from manipnet_tools.assets.makehuman import Assets
+from manipnet_tools.generate.hand_mesh import HandMesh, default_adult
 
 FREE_HAND: Final = Path(__file__).with_name("free_hand.npz")
 NAME: Final = "free hand (MakeHuman's default adult, CC0)"
