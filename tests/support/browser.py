@@ -122,7 +122,14 @@ class Page:
     def choose(self, label: str, option: str) -> None:
         """Open the list of a label and take one of its options."""
         self.tick(label)
-        self.press(self.wait_for(f"({_CENTER})({_BY_OPTION})({json.dumps(option)}, 0)"))
+        place, before = self._place_of(option), None
+        while place != before:  # the list moves while it opens, above its field or below
+            time.sleep(0.1)
+            place, before = self._place_of(option), place
+        self.press(place)
+
+    def _place_of(self, option: str) -> tuple[float, float]:
+        return tuple(self.wait_for(f"({_CENTER})({_BY_OPTION})({json.dumps(option)}, 0)"))
 
     def drop(self, name: str, file: Path) -> None:
         """Drop a file on the page under a name."""

@@ -20,21 +20,31 @@ FLOOR_EVERY: Final = 15
 
 
 class ActorView:
-    """The hands and props of one actor, under `name`."""
+    """The hands and props of one actor, under `name`.
+
+    Hands that are not shown any more are hidden and never removed: viser's client 1.1.1 fails when a node with others
+    below it is removed.
+    """
 
     def __init__(self, scene: viser.SceneApi, name: str, look: HandLook) -> None:
         self._scene, self._name, self._look = scene, name, look
         self._hands: dict[Side, HandModel] = {}
         self._props = PropModels(scene, f"{name}/props")
         self._avatar: dict[Side, AvatarModel] = {}
+        self._avatars: list[tuple[AvatarLook, dict[Side, AvatarModel]]] = []
+        """Every avatar that was shown."""
+        self._sizes = 0
+        """How many models of the model's hand there are, one for each size."""
 
     def wear(self, look: AvatarLook) -> None:
         """Show the hands of an avatar instead of the model's; an empty look shows the model's again."""
         for model in self._avatar.values():
-            model.remove()
-        self._avatar = {
-            side: AvatarModel(self._scene, f"{self._name}/avatar/{side}", mesh, side) for side, mesh in look.items()
-        }
+            model.show(False)
+        self._avatar = next((models for known, models in self._avatars if known is look), {})
+        if look and not self._avatar:
+            name = f"{self._name}/avatar/{len(self._avatars)}"
+            self._avatar = {side: AvatarModel(self._scene, f"{name}/{side}", mesh, side) for side, mesh in look.items()}
+            self._avatars.append((look, self._avatar))
 
     def show(
         self, frame: Frame, shapes: Mapping[str, ShapeView], avatar: Mapping[Side, HandPose] | None = None
@@ -47,11 +57,17 @@ class ActorView:
                 model.pose(avatar[side])
         for side, hand in hands.items():
             if side not in self._hands or self._hands[side].scale != hand.scale:
-                self._hands[side] = HandModel(self._scene, f"{self._name}/{side}", self._look, side, hand.scale)
+                self._make_hand(side, hand.scale)
             self._hands[side].pose(hand)
         for side, model in self._hands.items():
             model.show(side in hands and not self._avatar)
         self._props.show(frame.props, shapes, poses(frame), True)
+
+    def _make_hand(self, side: Side, scale: float) -> None:
+        if side in self._hands:
+            self._hands[side].show(False)
+        self._hands[side] = HandModel(self._scene, f"{self._name}/{side}-{self._sizes}", self._look, side, scale)
+        self._sizes += 1
 
 
 class Stage:

@@ -63,10 +63,6 @@ class AvatarModel:
         """Show or hide it."""
         self._root.visible = visible
 
-    def remove(self) -> None:
-        """Remove it from the scene."""
-        self._root.remove()
-
 
 def plain_look(profile: HandProfile) -> AvatarLook:
     """A mannequin's hands for a profile without a skin: a capsule for each bone, as thick as the profile says."""

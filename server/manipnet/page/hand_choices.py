@@ -5,7 +5,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Mapping
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -27,6 +27,8 @@ class HandChoices:
     def __init__(self, link: RpcClient, show: Show) -> None:
         self._link, self._show = link, show
         self._dropped: dict[str, HandProfile] = {}
+        self._looks: dict[str, AvatarLook] = {}
+        """How each hand looks that was chosen; the scene draws the same look once."""
         self._chosen: dict[str, tuple[str, HandProfile]] = {}
         """By actor: the chosen hand, and its profile under the name that the server knows."""
         self._lock = threading.Lock()
@@ -53,11 +55,14 @@ class HandChoices:
                 self._show.show_avatar(actor, profile.name, self._look(hand, profile))
             self._link.show_hands(profile.name for _, profile in self._chosen.values())
 
-    def keep(self, known: Mapping[str, str]) -> None:
-        """Upload again what the server has forgotten, because nobody watched; `known` are its profiles and actors."""
+    def keep(self, known: Collection[tuple[str, str]]) -> None:
+        """Upload again what the server has forgotten, because nobody watched.
+
+        `known` are the names of its profiles, each with its actor.
+        """
         with self._lock:
             for actor, (_, profile) in self._chosen.items():
-                if known.get(profile.name) != actor:
+                if (profile.name, actor) not in known:
                     self._upload(actor, profile)
 
     def add(self, name: str, content: bytes) -> str:
@@ -79,15 +84,17 @@ class HandChoices:
             profile = read_profile(made)
         with self._lock:
             self._dropped = {**self._dropped, profile.name: profile}
+            self._looks.pop(profile.name, None)
         return profile.name
 
     def _upload(self, actor: str, profile: HandProfile) -> None:
         self._link.ask(op="hand_profile", actor=actor, profile=json.loads(profile_to_json(profile)))
 
     def _look(self, hand: str, profile: HandProfile) -> AvatarLook:
-        if hand in self._dropped:
-            return plain_look(profile)
-        return {side: shipped.mesh(hand, side) for side in SIDES}
+        if hand not in self._looks:
+            skins = hand not in self._dropped
+            self._looks[hand] = {side: shipped.mesh(hand, side) for side in SIDES} if skins else plain_look(profile)
+        return self._looks[hand]
 
 
 def is_avatar(name: str, content: bytes) -> bool:

@@ -83,10 +83,6 @@ class HandModel:
         """Show or hide it."""
         self._root.visible = visible
 
-    def remove(self) -> None:
-        """Remove it from the scene."""
-        self._root.remove()
-
     def _skinned(
         self,
         part: str,

@@ -34,7 +34,7 @@ class HandsTab:
         actors = tuple(status["actors"])
         if self._actor.options != actors:
             self._actor.options, self._actor.visible = actors, len(actors) > 1
-        self._choices.keep(status.get("hand_profiles", {}))
+        self._choices.keep({(name, actor) for name, actor in status["hand_profiles"]})
         self._show()
 
     def use(self, hand: str) -> str:

@@ -34,6 +34,6 @@ def test_the_file_holds_both_hands_in_the_world_at_sixty_hertz(still_model, mani
         aligned = np.abs((arrays[f"{side}_rotations"][:, 0] * wrist[:, 3:]).sum(axis=1))
         np.testing.assert_allclose(aligned, 1.0, atol=1e-6)
     with pytest.raises(ConfigError, match=r"--look-ahead is 0\.7 s; allowed are 0 to 0\.5"):
-        replace(options, look_ahead=0.7).check()
+        replace(options, look_ahead=0.7, force=True).check()
     with pytest.raises(TakeError, match=r"--mesh spoon=x\.obj: no object is called 'spoon'; the objects are mug1"):
         read_shapes(("spoon=x.obj",), take, options.take)
