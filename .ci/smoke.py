@@ -1,4 +1,4 @@
-"""Install a wheel into a new environment, as a user would, and start the server: `python .ci/smoke.py dist/*.whl`."""
+"""Install the wheels into a new environment, as a user would: `python .ci/smoke.py WHEEL FULL_WIDTH_WHEEL`."""
 
 import os
 import subprocess
@@ -10,12 +10,15 @@ from pathlib import Path
 
 FREE_PORTS = [f"--{name}-port=0" for name in ("input", "control", "osc", "page", "web")] + ["--port=0"]
 START_S = 300.0
+LARGEST_WHEEL_MB = 15
 LICENCES = ("License-Expression: Apache-2.0 AND CC-BY-NC-4.0", "License-File: LICENSE", "License-File: models/LICENSE")
 METADATA = "from importlib.metadata import distribution; print(distribution('manipnet-live').read_text('METADATA'))"
 
 
-def main(wheel: str) -> None:
-    """Install without extras, look at the metadata, run the commands, and wait until the demo is ready."""
+def main(wheel: str, full_width_wheel: str) -> None:
+    """Install without extras, look at the metadata, run the commands, start the demo, add the large models."""
+    size_mb = Path(wheel).stat().st_size / 1e6
+    assert size_mb <= LARGEST_WHEEL_MB, f"the wheel has {size_mb:.1f} MB; at most {LARGEST_WHEEL_MB} are allowed"
     with tempfile.TemporaryDirectory() as folder:
         venv.create(folder, with_pip=True)
         programs = Path(folder) / ("Scripts" if os.name == "nt" else "bin")
@@ -28,6 +31,17 @@ def main(wheel: str) -> None:
         for arguments in (["--help"], ["doctor", "--help"], ["replay", "--help"]):
             subprocess.run([programs / "manipnet", *arguments], stdout=subprocess.DEVNULL, check=True, cwd=folder)
         start_demo([str(programs / "manipnet-serve"), "--demo", *FREE_PORTS], folder)
+        add_full_width(programs, full_width_wheel)
+
+
+def add_full_width(programs: Path, wheel: str) -> None:
+    """Ask for a full-width model before and after its package is installed."""
+    command = [programs / "manipnet-serve", "--model", "manipnet-full-int8"]
+    refusal = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False, timeout=START_S).stderr
+    assert "manipnet-live-full-width, which is not installed" in refusal, refusal
+    subprocess.run([programs / "python", "-m", "pip", "install", "-q", wheel], check=True)
+    version = subprocess.run([programs / "manipnet", "--version"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    assert "manipnet-full-int8" in version, version
 
 
 def start_demo(command: list[str], folder: str) -> None:

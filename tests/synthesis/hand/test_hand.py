@@ -19,7 +19,7 @@ from manipnet.synthesis.hand.validation import HandError
 from manipnet.synthesis.ik.solvers import SOLVERS
 from manipnet.synthesis.model.bundle import Bundle, open_session
 from manipnet.synthesis.model.layout import layout_of
-from manipnet.synthesis.model.shipped import models_folder, shipped_hand, shipped_models
+from manipnet.synthesis.model.shipped import shipped_bundles, shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet.synthesis.synthesizer import Synthesizer
@@ -36,8 +36,8 @@ def arrays_of(hand: Hand) -> dict[str, np.ndarray]:
 
 
 def test_every_shipped_bundle_has_the_same_hand() -> None:
-    assert len(shipped_models()) == 4
-    contents = {(models_folder() / model / HAND_FILE).read_bytes() for model in shipped_models()}
+    assert len(shipped_bundles()) == 4
+    contents = {(folder / HAND_FILE).read_bytes() for folder in shipped_bundles().values()}
     assert len(contents) == 1
 
 

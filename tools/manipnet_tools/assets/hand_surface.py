@@ -12,7 +12,7 @@ from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand, Sensors, Skin
 from manipnet.synthesis.hand.hand_file import HAND_FILE, write_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.model.shipped import models_folder, shipped_hand, shipped_models
+from manipnet.synthesis.model.shipped import shipped_bundles, shipped_hand
 from manipnet_tools.assets.hand_sdf import HandShape, bind_shape, palmar_directions
 from manipnet_tools.assets.surface_nets import extract, neighbour_mean, polish
 
@@ -94,8 +94,8 @@ def _strongest(weights: Array, count: int) -> tuple[NDArray[np.int64], Array]:
 
 def main() -> None:
     """Rewrite the hand of every shipped bundle."""
-    for model in shipped_models():
-        path = models_folder() / model / HAND_FILE
+    for model, folder in shipped_bundles().items():
+        path = folder / HAND_FILE
         hand = with_surface(shipped_hand(model))
         write_hand(hand, path)
         print(f"{path}: {len(hand.skin.vertices)} vertices, {hand.sensor_count} sensors, {path.stat().st_size} bytes")
