@@ -73,6 +73,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("process")
         if not {"client", "dataset", "process", "slow"} & {marker.name for marker in item.iter_markers()}:
             item.add_marker("quick")
+    items.sort(
+        key=lambda item: item.get_closest_marker("quick") is not None
+    )  # so that no worker ends long after the rest
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -80,6 +83,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """With `-n`, each worker takes whole files, because the servers that tests share live as long as a module."""
     from xdist.scheduler import LoadFileScheduling
 
+    config.option.loadscopereorder = False  # files with many tests are not those that take long
     return LoadFileScheduling(config, log)
 
 

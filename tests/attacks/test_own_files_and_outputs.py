@@ -83,12 +83,13 @@ def test_a_cut_cache_is_rebuilt_and_reported(kernels: Path, tiny_bundle: Path, t
 
 
 def test_a_name_that_the_output_cannot_show_ends_nothing(tiny_bundle: Path, tmp_path: Path) -> None:
-    server = start(tmp_path, tiny_bundle, PYTHONIOENCODING="cp1252", PYTHONUTF8="0")
-    wait_ready(server)
-    assert server.stdout is not None
-    lines = [server.stdout.readline() for _ in range(3)]
-    assert all(lines)
-    end(server)
+    western = {"PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+    options = ("--model", str(tiny_bundle), "--takes", str(tmp_path), *OPTIONS)
+    with serving(*options, environment=western) as server:
+        assert server.ask({"op": "record", "name": "日本"})["name"] == "日本.mcap"
+        assert server.stop() == 0
+        assert "1 recording is kept" in list(iter(server.line, ""))[-1]
+    assert (tmp_path / "日本.mcap").is_file()
 
 
 def test_a_name_that_the_system_cannot_write_is_refused_by_its_reason(tiny_bundle: Path, tmp_path: Path) -> None:
