@@ -73,9 +73,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("process")
         if not {"client", "dataset", "process", "slow"} & {marker.name for marker in item.iter_markers()}:
             item.add_marker("quick")
-    items.sort(
-        key=lambda item: item.get_closest_marker("quick") is not None
-    )  # so that no worker ends long after the rest
+    # what takes long goes first, so that no worker ends long after the rest
+    items.sort(key=lambda item: item.get_closest_marker("quick") is not None)
 
 
 @pytest.hookimpl(optionalhook=True)
