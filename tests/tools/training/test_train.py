@@ -11,20 +11,24 @@ import trimesh
 torch = pytest.importorskip("torch", reason="training needs the train extra")
 
 from manipnet.geometry import quat_exp
+from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.layout import layout_of
-from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet.synthesis.model.shipped import BundleError, shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
 from manipnet_tools.evaluation import ablate
 from manipnet_tools.evaluation.options import ABLATION_TRAINING, AblateOptions
+from manipnet_tools.generate.free_hand import free_hand
+from manipnet_tools.generate.proportions import Proportions, proportioned
 from manipnet_tools.training import quantise
 from manipnet_tools.training.config import TrainConfig
-from manipnet_tools.training.dataset import CapturedHand
+from manipnet_tools.training.dataset import CapturedHand, TakeSet
 from manipnet_tools.training.model import hidden_columns
 from manipnet_tools.training.options import QuantiseOptions
-from manipnet_tools.training.sampler import FUTURE_FRAMES, RoundSampler
-from manipnet_tools.training.train import Trainer, train
+from manipnet_tools.training.sampler import FUTURE_FRAMES, RoundSampler, main_hand
+from manipnet_tools.training.start import read_start
+from manipnet_tools.training.train import Trainer, new_model, train
 from manipnet_tools.training.trained import save_bundle
 
 HAND = shipped_hand()
@@ -46,7 +50,8 @@ def hands(tmp_path_factory):
     wrist = np.stack([np.concatenate([[0.0, 1.0, 0.1 * s], quat_exp(np.array([0.0, 0.2 * s, 0.0]))]) for s in closed])
     obj = np.tile([0.1, 0.97, 0.0, 0.0, 0.0, 0.0, 1.0], (FRAMES, 1))
     other = np.tile([0.5, 1.0, 0.0], (FRAMES, 1))
-    return [CapturedHand(f"take{k}/right", HAND, shape, bool(k), wrist, other, obj, angles) for k in range(2)]
+    takes = [CapturedHand(f"take{k}/right", HAND, shape, bool(k), wrist, other, obj, angles) for k in range(2)]
+    return [TakeSet(takes)]
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +60,7 @@ def learned(hands):
 
 
 def test_reversing_a_take_twice_restores_it(hands):
-    captured = hands[0]
+    captured = hands[0].hands[0]
     flipped = captured.backwards()
     np.testing.assert_array_equal(flipped.angles[0], captured.angles[-1])
     np.testing.assert_array_equal(flipped.backwards().wrist, captured.wrist)
@@ -69,13 +74,15 @@ def test_frames_after_the_share_are_never_used(hands):
     """The samples do not depend on the rest of a take."""
     share = 0.6
     last = int(FRAMES * share)
-    torn = [replace(captured, angles=captured.angles.copy(), wrist=captured.wrist.copy()) for captured in hands]
+    torn = [
+        replace(captured, angles=captured.angles.copy(), wrist=captured.wrist.copy()) for captured in hands[0].hands
+    ]
     for captured in torn:
         captured.angles[last:] = HAND.limits[:, 0]
         captured.wrist[last:, :3] += 1.0
     config = replace(TINY, warp=0.0)
     assert last > 2 * FUTURE_FRAMES
-    ours, theirs = (RoundSampler(of, config, share).next_round(None) for of in (hands, torn))
+    ours, theirs = (RoundSampler(of, config, share).next_round(None) for of in (hands, [TakeSet(torn)]))
     np.testing.assert_array_equal(ours.inputs, theirs.inputs)
     np.testing.assert_array_equal(ours.outputs, theirs.outputs)
 
@@ -84,7 +91,8 @@ def test_a_model_learns(hands):
     sampler = RoundSampler(hands, TINY, 1.0)
     samples = sampler.next_round(None)
     torch.manual_seed(0)
-    trainer = Trainer(HAND, samples, replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0))
+    config = replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0)
+    trainer = Trainer(new_model(HAND, samples, config), config)
     assert trainer.learn(samples) < 0.5, "a constant answer has a mean squared deviation of one"
 
 
@@ -134,10 +142,70 @@ def test_hidden_inputs_do_not_reach_the_network(hands, tmp_path):
 
 def test_every_row_of_the_ablation_is_trained_once(hands, tmp_path):
     options = AblateOptions(tmp_path, tmp_path, training=replace(ABLATION_TRAINING, width=12, rounds=1))
-    ablate.train_rows(hands, options, "fold", 1.0)
+    ablate.train_rows(hands[0].hands, options, "fold", 1.0)
     written = {row: ablate.folder_of(tmp_path, row, "fold") / "bundle.json" for row in ablate.ROWS}
     stamps = {row: path.stat().st_mtime_ns for row, path in written.items()}
-    ablate.train_rows(hands, options, "fold", 1.0)
+    ablate.train_rows(hands[0].hands, options, "fold", 1.0)
     assert stamps == {row: path.stat().st_mtime_ns for row, path in written.items()}
     configs = [json.loads(path.read_text())["training"] for path in written.values()]
     assert len({(c["architecture"], *c["hidden"]) for c in configs}) == len(ablate.ROWS)
+
+
+def test_training_goes_on_from_a_bundle(hands, learned, tmp_path):
+    save_bundle(replace(learned, licence="ours; trained on one set"), tmp_path / "first")
+    start, config = read_start(str(tmp_path / "first"), replace(TINY, width=768, rounds=1, epochs_per_round=1))
+    assert config.width == TINY.width, "the width belongs to the weights"
+    assert start.licence == "ours; trained on one set"
+    rows = RoundSampler(hands, TINY, 1.0).next_round(None).inputs[:64]
+    with torch.no_grad():
+        before, bundle = start.network(torch.from_numpy(rows)), load_bundle(tmp_path / "first")
+    np.testing.assert_allclose(before.numpy(), bundle.infer(rows), atol=1e-5)
+    gone_on, anew = train(hands, replace(config, learning_rate=1e-6), start=start), train(hands, config)
+    with torch.no_grad():
+        after, fresh = (of.model(torch.from_numpy(rows)) for of in (gone_on, anew))
+    assert (after - before).abs().mean() < 0.1 * (fresh - before).abs().mean()
+
+
+def test_a_quantised_bundle_is_not_gone_on_from(hands, tmp_path):
+    save_bundle(train(hands, replace(TINY, width=192, rounds=1, epochs_per_round=1)), tmp_path / "wide")
+    quantise.run(QuantiseOptions(str(tmp_path / "wide"), tmp_path / "small"))
+    with pytest.raises(BundleError, match="has quantised weights"):
+        read_start(str(tmp_path / "small"), TINY)
+
+
+def test_the_bundle_is_written_after_each_round(hands):
+    seen = []
+    train(hands, TINY, after_round=lambda now: seen.append(now.seconds))
+    assert len(seen) == TINY.rounds
+
+
+def test_sets_give_samples_by_weight_and_a_round_is_no_larger_than_it_may_be(hands):
+    long, short = replace(hands[0], weight=1.0), TakeSet([hands[0].hands[0]], weight=3.0)
+    sampler = RoundSampler(
+        [long, short], replace(TINY, round_samples=400, captured=0.5, blended=0.5, on_policy=0.0), 1.0
+    )
+    assert 390 <= len(sampler.next_round(None)) <= 400
+    assert [round(part.thinned * sum(b - a for a, b in part.spans)) for part in sampler._parts] == [100, 300]
+
+
+def test_hands_of_other_proportions_and_frames_are_learned_together(hands):
+    """Each take is sampled and rolled out with its own hand, in the bone frames of the model's."""
+    other = proportioned(free_hand(), Proportions(1.15, 0.95, 1.1, (0.004, 0.01)), "another")
+    free = TakeSet([replace(captured, hand=other) for captured in hands[0].hands])
+    model = train([hands[0], free], replace(TINY, rounds=2))
+    assert model.hand is HAND
+    sampler = RoundSampler([hands[0], free], TINY, 1.0)
+    used = sampler._parts[1].hands[0].hand
+    angles = np.random.default_rng(0).uniform(*other.limits.T, (20, other.angle_count))
+    np.testing.assert_allclose(forward_kinematics(used, angles)[0], forward_kinematics(other, angles)[0], atol=1e-9)
+    flat = [forward_kinematics(hand, np.zeros(hand.angle_count))[1] for hand in (used, HAND)]
+    np.testing.assert_allclose(*flat, atol=1e-9)
+    samples = sampler.next_round(model.model)
+    assert np.isfinite(samples.inputs).all()
+    assert np.isfinite(samples.outputs).all()
+
+
+def test_the_model_poses_the_hand_that_most_takes_of_the_first_set_have(hands):
+    other = proportioned(free_hand(), Proportions(1.1), "another")
+    first, second = hands[0].hands
+    assert main_hand(TakeSet([replace(first, hand=other), second, first])) is HAND

@@ -22,9 +22,9 @@ from manipnet_tools.evaluation.results import Fold
 from manipnet_tools.evaluation.roll_outs import baseline_rows, evaluate, folds, model_rows
 from manipnet_tools.takes.dataset import take_folders
 from manipnet_tools.terminal import open_console
-from manipnet_tools.training.dataset import CapturedHand, load_captured_hands
+from manipnet_tools.training.dataset import CapturedHand, TakeSet, load_captured_hands
 from manipnet_tools.training.sampler import RoundSampler
-from manipnet_tools.training.train import Trainer, trained
+from manipnet_tools.training.train import Trainer, new_model, trained
 from manipnet_tools.training.trained import save_bundle
 
 _log = logging.getLogger(__name__)
@@ -83,15 +83,16 @@ def train_rows(hands: Sequence[CapturedHand], options: AblateOptions, fold: str,
         return
     torch.set_num_threads(1)
     configs = {row: replace(options.training, **ROWS[row]) for row in wanted}
-    sampler = RoundSampler(hands, options.training, share)
+    sets = [TakeSet(hands)]
+    sampler = RoundSampler(sets, options.training, share)
     trainers: dict[str, Trainer] = {}
     for turn in range(options.training.rounds):
         samples = sampler.next_round(None)
         for row, config in configs.items():
             if not turn:
                 torch.manual_seed(config.seed)
-                trainers[row] = Trainer(sampler.hand, samples, config)
+                trainers[row] = Trainer(new_model(sampler.hand, samples, config), config)
             loss = trainers[row].learn(samples)
             _log.info("%s  %s  round %d/%d  loss %.4f", fold, row, turn + 1, config.rounds, loss)
     for row, trainer in trainers.items():
-        save_bundle(trained(trainer, sampler, hands, configs[row], share, 0.0), folder_of(options.out, row, fold))
+        save_bundle(trained(trainer, sampler, sets, configs[row], share, 0.0), folder_of(options.out, row, fold))

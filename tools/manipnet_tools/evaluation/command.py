@@ -100,10 +100,10 @@ def _left_out(folder: Path, fold: Fold, data: Path) -> Bundle:
     """The bundle of a fold, which is trained first if it does not exist."""
     if not (folder / "bundle.json").is_file():
         from manipnet_tools.training.config import TrainConfig
-        from manipnet_tools.training.dataset import load_captured_hands
+        from manipnet_tools.training.dataset import TakeSet, load_captured_hands
         from manipnet_tools.training.train import train
         from manipnet_tools.training.trained import save_bundle
 
         hands = load_captured_hands(data, [case.name for case in fold.train])
-        save_bundle(train(hands, TrainConfig()), folder)
+        save_bundle(train([TakeSet(hands)], TrainConfig()), folder)
     return load_bundle(folder)

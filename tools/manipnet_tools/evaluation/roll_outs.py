@@ -1,6 +1,8 @@
 """Makes the rows of an evaluation: models rolled out on takes, and hands that need no network."""
 
 from collections.abc import Callable, Collection, Container, Sequence
+from dataclasses import replace
+from itertools import groupby
 
 from rich.progress import Progress
 
@@ -22,6 +24,7 @@ from manipnet_tools.evaluation.results import (
     Row,
     row_name,
 )
+from manipnet_tools.generate.bone_frames import in_frames_of
 from manipnet_tools.takes.rollout import roll_out
 
 Source = Callable[[Fold, Callable[[int], None]], list[Hands]]
@@ -101,7 +104,16 @@ def baseline_rows(model: Callable[[Fold], Bundle]) -> dict[str, Source]:
 def synthesise(
     bundle: Bundle, solver: str, cases: Sequence[Case], advance: Callable[[int], None] = lambda n: None
 ) -> list[Hands]:
-    """Roll out both hands of all cases from the neutral pose; returns joints in the canonical wrist frame."""
-    inputs = [case.inputs for case in cases]
-    motions = iter(roll_out(Synthesizer(bundle, solver), [seen for of in inputs for seen in of.values()], advance))
-    return [{side: next(motions).positions for side in of} for of in inputs]
+    """Roll out both hands of all cases from the neutral pose; returns joints in the canonical wrist frame.
+
+    The network poses the hand that was captured, so that joint errors tell how well it poses hands and not how long
+    its own fingers are.
+    """
+    results = []
+    for _, same in groupby(cases, lambda case: case.hand.packed.tobytes()):
+        of_hand = list(same)
+        inputs = [case.inputs for case in of_hand]
+        posed = replace(bundle, hand=in_frames_of(of_hand[0].hand, bundle.hand))
+        motions = iter(roll_out(Synthesizer(posed, solver), [seen for of in inputs for seen in of.values()], advance))
+        results += [{side: next(motions).positions for side in of} for of in inputs]
+    return results

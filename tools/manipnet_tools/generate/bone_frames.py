@@ -16,9 +16,12 @@ from manipnet.synthesis.hand.kinematics import forward_kinematics
 def in_frames_of(hand: Hand, other: Hand) -> Hand:
     """The hand with the frames that the bones of another hand of the same layout have when all angles are zero.
 
-    Joints, hinges, skin and sensors stay where they are, and so do the angles of every pose.
+    Joints, hinges, skin and sensors stay where they are, and so do the angles of every pose. It is the same object if
+    it has these frames already.
     """
     own, others = (forward_kinematics(each, np.zeros(each.angle_count))[1] for each in (hand, other))
+    if np.allclose(own, others, rtol=0.0, atol=1e-9):
+        return hand
     turns = np.swapaxes(own, 1, 2) @ others  # from each bone's new frame to its old one
     turns[0] = np.eye(3)
     parents = hand.parents[: hand.bone_count]

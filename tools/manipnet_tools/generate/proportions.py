@@ -9,18 +9,24 @@ from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand, Indices
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 
-HANDS: Final = 16
+HANDS: Final = 24
 """How many hands a set is made with; the first is the free hand itself."""
-_SPREAD: Final = 0.15
+_SIZES, _FINGERS, _THICKNESSES = (0.85, 1.2), (0.9, 1.1), (0.9, 1.2)
+_WRIST_M: Final = 0.012
+"""Rigs and trackers put the wrist this far from where anatomy has it."""
 
 
 @dataclass(frozen=True)
 class Proportions:
-    """Relative to the free hand: the size of everything, the length of the fingers, and the thickness."""
+    """Relative to the free hand: the size of everything, the length of the fingers, and the thickness.
+
+    `palm_m` is how far the palm with all that belongs to it is moved in the wrist frame, along x and z.
+    """
 
     size: float = 1.0
     fingers: float = 1.0
     thickness: float = 1.0
+    palm_m: tuple[float, float] = (0.0, 0.0)
 
 
 def drawn_proportions(number: int, seed: int) -> Proportions:
@@ -28,9 +34,9 @@ def drawn_proportions(number: int, seed: int) -> Proportions:
     if number == 0:
         return Proportions()
     rng = np.random.default_rng([seed, 7, number])
-    size = 1.0 + _SPREAD * float(np.clip(rng.normal(0.0, 0.5), -1.0, 1.0))
-    fingers, thickness = (1.0 + 0.1 * float(rng.uniform(-1.0, 1.0)) for _ in range(2))
-    return Proportions(round(size, 3), round(fingers, 3), round(thickness, 3))
+    size, fingers, thickness = (round(float(rng.uniform(*limits)), 3) for limits in (_SIZES, _FINGERS, _THICKNESSES))
+    along, up = (round(float(rng.uniform(-_WRIST_M, _WRIST_M)), 4) for _ in range(2))
+    return Proportions(size, fingers, thickness, (0.5 * along, up))
 
 
 def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
@@ -41,7 +47,9 @@ def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
     long = np.ones(hand.joint_count)
     for finger in hand.fingers:
         long[list(finger[-3:])] = proportions.fingers
+    shift = np.array([proportions.palm_m[0], 0.0, proportions.palm_m[1]])
     offsets = proportions.size * long[:, None] * hand.offsets
+    offsets[1:][hand.parents[1:] == 0] += shift
     radii = proportions.size * proportions.thickness * hand.radii
     changed = replace(hand, name=name, offsets=offsets, radii=radii)
     before, turns = forward_kinematics(hand, hand.skin.bind_angles)
@@ -60,7 +68,8 @@ def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
         reach = np.sum(points * direction, axis=-1, keepdims=True)
         aside = points - reach * direction
         thick = np.where(bones == 0, 1.0, proportions.thickness)[..., None]
-        return proportions.size * (stretch[bones][..., None] * reach * direction + thick * aside)
+        moved = np.where(bones == 0, 1.0, 0.0)[..., None] * shift
+        return moved + proportions.size * (stretch[bones][..., None] * reach * direction + thick * aside)
 
     skin, sensors = hand.skin, hand.sensors
     local = np.einsum("vkji,vkj->vki", turns[skin.bones], skin.vertices[:, None] - before[skin.bones])

@@ -4,7 +4,7 @@ A folder without the file is the ManipNet dataset itself.
 """
 
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +13,10 @@ from manipnet.geometry import SIDES, Side
 from manipnet_tools.takes.dataset import DataError
 
 SOURCES_FILE: Final = "sources.json"
+FREE_LICENCES: Final = ("Apache-2.0", "MIT", "BSD-3-Clause", "CC0-1.0", "CC BY 4.0")
+"""Licences that allow commercial use; the last one for credit."""
+_BETWEEN: Final = " | "
+_TRAINED_ON: Final = "; trained on "
 MANIPNET_LICENCE: Final = (
     "CC BY-NC 4.0; trained on the ManipNet dataset by He Zhang, Yuting Ye, Takaaki Shiratori and Taku Komura"
 )
@@ -62,10 +66,20 @@ def captured_sides(data: Path, take: str) -> tuple[Side, ...]:
 def licence_of(data: Path, takes: Collection[str]) -> str:
     """The terms of a model that is trained on some takes of a folder. Raises `DataError`."""
     sources = read_sources(data)
-    texts = [
+    texts = (
         MANIPNET_LICENCE
         if (source := sources.get(take)) is None
-        else f"{source.licence}; trained on {source.name}" + (f" by {source.attribution}" if source.attribution else "")
+        else f"{source.licence}{_TRAINED_ON}{source.name}" + (f" by {source.attribution}" if source.attribution else "")
         for take in takes
-    ]
-    return " | ".join(dict.fromkeys(texts)) or MANIPNET_LICENCE
+    )
+    return join_licences(texts) or MANIPNET_LICENCE
+
+
+def join_licences(licences: Iterable[str]) -> str:
+    """The terms of several sources as one text, each once."""
+    return _BETWEEN.join(dict.fromkeys(part for text in licences for part in text.split(_BETWEEN)))
+
+
+def foreign_terms(licence: str) -> list[str]:
+    """The parts of such a text that forbid commercial use or do not say that they allow it."""
+    return [part for part in licence.split(_BETWEEN) if part.partition(_TRAINED_ON)[0].strip() not in FREE_LICENCES]

@@ -12,10 +12,11 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.model.decode import angles_from_outputs
 from manipnet_tools.training.dataset import TICK_FRAMES, CapturedHand, Samples, concatenate, samples_at
 
 Policy = Callable[[np.ndarray], Array]
-"""Maps feature rows `(N, input_size)` to angles `(N, A)` inside the limits."""
+"""Maps feature rows `(N, input_size)` to network outputs `(N, output_size)`."""
 
 
 @dataclass(frozen=True)
@@ -73,29 +74,33 @@ def on_policy_samples(
     hands: Sequence[CapturedHand],
     spans: Sequence[tuple[int, int]],
     policy: Policy,
-    starts: int,
+    starts: Sequence[int],
     ticks: int,
     rule: AnswerRule,
     pool: Array,
     limits: Array,
     rng: np.random.Generator,
 ) -> Samples:
-    """Samples along roll-outs of the model, `ticks` long, from `starts` random poses of each hand.
+    """Samples along roll-outs of the model, `ticks` long, from random poses: `starts` of them for each hand.
+
+    The answers of the network are decoded with the hand of each take, which need not be the model's.
 
     Source: Ross, Gordon and Bagnell 2011 (DAgger).
     """
-    frames = [rng.integers(low, high - TICK_FRAMES * ticks, starts) for low, high in spans]
+    frames = [rng.integers(low, high - TICK_FRAMES * ticks, n) for (low, high), n in zip(spans, starts, strict=True)]
     states = []
     for captured, at in zip(hands, frames, strict=True):
         before = captured.angles_at(at - TICK_FRAMES)
-        as_captured = rng.random((starts, 1)) < 0.5
+        as_captured = rng.random((len(at), 1)) < 0.5
         states.append(np.where(as_captured, before, blended_poses(captured.hand, before, pool, rng)))
     states = [np.clip(state, limits[:, 0], limits[:, 1]) for state in states]
     parts: list[Samples] = []
+    ends = np.cumsum(starts)[:-1]
     for _ in range(ticks):
         tick = [_tick_samples(*each, rule) for each in zip(hands, frames, states, strict=True)]
         parts += tick
-        answers = np.split(policy(np.concatenate([samples.inputs for samples in tick])), len(hands))
+        outputs = np.split(policy(np.concatenate([samples.inputs for samples in tick])), ends)
+        answers = [angles_from_outputs(c.hand, o, limits) for c, o in zip(hands, outputs, strict=True)]
         states = [s + rule.response * (a - s) for s, a in zip(states, answers, strict=True)]
         frames = [at + TICK_FRAMES for at in frames]
     return concatenate(parts)

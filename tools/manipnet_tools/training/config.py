@@ -46,6 +46,8 @@ class TrainConfig:
     """Samples at poses that the model itself reaches, per captured frame and round."""
     roll_out_ticks: int = 40
     """Length of the roll-outs that on-policy samples come from."""
+    round_samples: int = 80_000
+    """A round has at most so many samples; from long takes, each round draws others."""
     warp: float = 0.2
     """Time is played faster or slower by a factor up to exp of this."""
     time_reversed: bool = False

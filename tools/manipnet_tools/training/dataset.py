@@ -87,6 +87,15 @@ class CapturedHand:
         return _between(self.angles, np.clip(at, 0, len(self) - 1))
 
 
+@dataclass(frozen=True, eq=False)
+class TakeSet:
+    """The hands of takes that belong together, such as those of one folder."""
+
+    hands: Sequence[CapturedHand]
+    weight: float = 1.0
+    """A set gives samples in proportion to its weight, however long its takes are."""
+
+
 def _between(values: Array, at: Array) -> Array:
     """Linear interpolation at fractional frames, which is exact enough for quaternions of neighbouring frames."""
     below = np.minimum(at.astype(np.int64), len(values) - 2)

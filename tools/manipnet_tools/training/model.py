@@ -10,8 +10,6 @@ import torch
 from torch import nn
 
 from manipnet.geometry import Array
-from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.model.decode import angles_from_outputs
 from manipnet.synthesis.model.layout import PRESENT, Block, Layout
 from manipnet_tools.training.augment import Policy
 from manipnet_tools.training.config import Architecture
@@ -175,14 +173,14 @@ class ManipNet(nn.Module):
         return torch.nn.functional.pad(pose, (0, self.layout.output_size - self._encoded_sizes[0]))
 
 
-def policy_of(model: ManipNet, hand: Hand, limits: Array) -> Policy:
-    """The model as a function from features to angles inside `limits (A, 2)`."""
+def policy_of(model: ManipNet) -> Policy:
+    """The model as a function from features `(N, input_size)` float32 to outputs `(N, output_size)`."""
     model.eval()
 
     def policy(rows: np.ndarray) -> Array:
         with torch.no_grad(), torch.autocast("cpu", torch.bfloat16):
             outputs = model(torch.from_numpy(rows))
-        return angles_from_outputs(hand, outputs.double().numpy(), limits)
+        return outputs.double().numpy()
 
     return policy
 

@@ -2,23 +2,30 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
-from manipnet.synthesis.model.shipped import find_bundle
-from manipnet_tools.commands.arguments import Positional
+from manipnet.synthesis.model.shipped import find_bundle, licence_of
+from manipnet_tools.commands.arguments import Positional, arg
 from manipnet_tools.commands.checks import require_new_bundle
 from manipnet_tools.commands.options import WritingOptions
-from manipnet_tools.takes.dataset import DataError, take_folders
 from manipnet_tools.training.config import TrainConfig
+from manipnet_tools.training.mixture import DataFolder, data_folders, licence_of_mixture, require_free
 
 
 @dataclass(frozen=True)
 class TrainOptions(WritingOptions):
-    """Train a model on the published takes."""
+    """Train a model on captured takes, on generated ones, or on a mixture of both."""
 
-    data: Path
-    """The dataset's folder, with BVH/ and meshes/."""
+    data: Annotated[tuple[str, ...], arg(metavar="FOLDER[=WEIGHT]")]
+    """Folders of takes: datasets with BVH/ and meshes/, or what `manipnet generate` writes. Each gives samples in
+    proportion to its WEIGHT, which is 1 unless given, however long its takes are. The model poses the hand that most
+    takes of the first folder have."""
     out: Path
-    """Folder of the bundle to write."""
+    """Folder of the bundle to write. It is written after each round."""
+    start: Annotated[str | None, arg(metavar="BUNDLE", help_behavior_hint="")] = None
+    """Go on from the weights of this bundle, by shipped name or folder, with its architecture and normalisation."""
+    free: bool = False
+    """Refuse takes and bundles whose terms forbid commercial use or do not say that they allow it."""
     leave_out: tuple[str, ...] = ()
     """Takes that are not used."""
     share: float = 1.0
@@ -26,18 +33,21 @@ class TrainOptions(WritingOptions):
     training: TrainConfig = field(default_factory=TrainConfig)
 
     def check(self) -> None:
-        """Raise `DataError` unless there are takes to train on, and `ConfigError` for a bundle that exists already."""
+        """Raise `DataError` for takes that cannot be used, `BundleError` for an unknown `--start`, and `ConfigError`
+        for a bundle that exists already."""
         require_new_bundle(self.out, self.force)
-        self.takes()
+        licence = self.licence()
+        if self.free:
+            require_free(licence)
 
-    def takes(self) -> list[str]:
-        """Names of the takes to train on. Raises `DataError` if there are none."""
-        names = [folder.name for folder in take_folders(self.data)]
-        if unknown := set(self.leave_out) - set(names):
-            raise DataError(f"--leave-out {min(unknown)}: the takes of {self.data} are {', '.join(names)}")
-        if not (left := [name for name in names if name not in self.leave_out]):
-            raise DataError(f"--leave-out names every take of {self.data}; leave some to train on")
-        return left
+    def folders(self) -> tuple[DataFolder, ...]:
+        """The folders of takes to train on. Raises `DataError`."""
+        return data_folders(self.data, self.leave_out)
+
+    def licence(self) -> str:
+        """The terms of the model. Raises `DataError` and `BundleError`."""
+        start = None if self.start is None else licence_of(find_bundle(self.start))
+        return licence_of_mixture(self.folders(), start)
 
 
 @dataclass(frozen=True)

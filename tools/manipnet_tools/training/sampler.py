@@ -1,67 +1,130 @@
 """Makes the training samples of captured hands, new ones for each round."""
 
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from manipnet.geometry import Array
+from manipnet.synthesis.hand.hand import Hand
+from manipnet_tools.generate.bone_frames import in_frames_of
 from manipnet_tools.training.augment import AnswerRule, captured_samples, on_policy_samples
 from manipnet_tools.training.config import TrainConfig
-from manipnet_tools.training.dataset import TICK_FRAMES, CapturedHand, Samples, concatenate
+from manipnet_tools.training.dataset import TICK_FRAMES, CapturedHand, Samples, TakeSet, concatenate
 from manipnet_tools.training.model import ManipNet, policy_of
 
 LIMIT_MARGIN_RAD = np.radians(7.0)
 FUTURE_FRAMES = 60
 """Frames of the future in a window. Samples end this long before the end of a span, so that training sees no frame of a
 test."""
+LEAST_STARTS = 8
+"""Roll-outs of one hand at the same time; with fewer, a tick costs as much and gives less."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """One set of takes, prepared for sampling. Its poses are blended among themselves only, because the angles of two
+    kinds of hands need not mean the same pose."""
+
+    hands: list[CapturedHand]
+    spans: list[tuple[int, int]]
+    pool: Array
+    """`(N, A)` captured poses."""
+    limits: Array
+    """`(A, 2)` radians."""
+    thinned: float
+    """Share of the recipe's samples per frame that a round takes."""
 
 
 class RoundSampler:
     """Makes the samples of each round, and determines the limits and the rest pose of the captured hands."""
 
-    def __init__(self, hands: Sequence[CapturedHand], config: TrainConfig, share: float) -> None:
-        """Use the first `share` of every take. All hands must be those of the same subject."""
-        self._spans = spans_of(hands, share)
-        self._hands, self._config = list(hands), config
-        self.hand = hands[0].hand
-        """The hand that the network poses."""
+    def __init__(
+        self, sets: Sequence[TakeSet], config: TrainConfig, share: float, frames_of: Hand | None = None
+    ) -> None:
+        """Use the first `share` of every take.
+
+        The network knows one layout of the bones' frames: that of `frames_of`, or else that of the model's hand.
+        """
+        self._config = config
+        own = main_hand(sets[0])
+        self.hand = own if frames_of is None else in_frames_of(own, frames_of)
+        """The hand that the network poses: the one that most takes of the first set have."""
         self._rng = np.random.default_rng(config.seed)
-        seen = [captured.angles[low:high:4] for captured, (low, high) in zip(hands, self._spans, strict=True)]
-        self._pool = np.concatenate(seen)
-        self.limits = pose_limits(self._pool)
+        self._parts = [
+            self._prepared(_in_frames(each.hands, self.hand), share, thinned)
+            for each, thinned in zip(sets, _thinned(sets, config, share), strict=True)
+        ]
+        first = self._parts[0]
+        self.limits = first.limits
         """`(A, 2)` radians."""
-        self.rest_angles = np.clip(self._pool.mean(axis=0), self.limits[:, 0], self.limits[:, 1])
+        self.rest_angles = np.clip(first.pool.mean(axis=0), self.limits[:, 0], self.limits[:, 1])
         """`(A,)` radians."""
-        if config.time_reversed:
-            self._spans += [
-                (len(captured) - high, len(captured) - low)
-                for captured, (low, high) in zip(hands, self._spans, strict=True)
-            ]
-            self._hands += [captured.backwards() for captured in hands]
+
+    def _prepared(self, hands: list[CapturedHand], share: float, thinned: float) -> _Part:
+        spans = spans_of(hands, share)
+        pool = np.concatenate([c.angles[low:high:4] for c, (low, high) in zip(hands, spans, strict=True)])
+        if self._config.time_reversed:
+            backward = [(len(c) - high, len(c) - low) for c, (low, high) in zip(hands, spans, strict=True)]
+            hands, spans = hands + [captured.backwards() for captured in hands], spans + backward
+        return _Part(hands, spans, pool, pose_limits(pool), thinned)
 
     def next_round(self, model: ManipNet | None) -> Samples:
         """Samples at captured and blended poses and, given a model, at poses that it reaches itself."""
-        config, rng = self._config, self._rng
+        config = self._config
         lag_ticks = (1.0 - config.response) / config.response
         rule = AnswerRule(config.residual_error, TICK_FRAMES * lag_ticks, config.response)
-        parts = []
-        for captured, (low, high) in zip(self._hands, self._spans, strict=True):
-            for share, pool in ((config.captured, None), (config.blended, self._pool)):
-                if share:
-                    frames = rng.integers(low, high, int(share * (high - low)))
-                    parts.append(captured_samples(captured, frames, pool, rule, self.limits, rng, config.warp))
-        if model is not None and config.on_policy:
-            parts.append(self._on_policy(model, rule))
-        return concatenate(parts)
+        samples: list[Samples] = []
+        for part in self._parts:
+            samples += self._around_captured(part, rule)
+            if model is not None and config.on_policy:
+                samples.append(self._on_policy(part, model, rule))
+        return concatenate(samples)
 
-    def _on_policy(self, model: ManipNet, rule: AnswerRule) -> Samples:
-        ticks = self._config.roll_out_ticks
-        wanted = self._config.on_policy * np.mean([high - low for low, high in self._spans])
-        starts = max(int(wanted / ticks), 1)
-        policy = policy_of(model, self.hand, self.limits)
-        return on_policy_samples(
-            self._hands, self._spans, policy, starts, ticks, rule, self._pool, self.limits, self._rng
-        )
+    def _around_captured(self, part: _Part, rule: AnswerRule) -> list[Samples]:
+        config, rng, samples = self._config, self._rng, []
+        for captured, (low, high) in zip(part.hands, part.spans, strict=True):
+            for share, pool in ((config.captured, None), (config.blended, part.pool)):
+                if count := int(share * part.thinned * (high - low)):
+                    frames = rng.integers(low, high, count)
+                    samples.append(captured_samples(captured, frames, pool, rule, part.limits, rng, config.warp))
+        return samples
+
+    def _on_policy(self, part: _Part, model: ManipNet, rule: AnswerRule) -> Samples:
+        ticks, rng = self._config.roll_out_ticks, self._rng
+        wanted = self._config.on_policy * part.thinned * sum(high - low for low, high in part.spans) / ticks
+        rolled = np.arange(len(part.hands))
+        if wanted < LEAST_STARTS * len(rolled):
+            rolled = rng.choice(rolled, max(int(wanted / LEAST_STARTS), 1), replace=False)
+        hands, spans = [part.hands[k] for k in rolled], [part.spans[k] for k in rolled]
+        starts = [max(int(wanted / len(rolled)), 1)] * len(rolled)
+        policy = policy_of(model)
+        return on_policy_samples(hands, spans, policy, starts, ticks, rule, part.pool, part.limits, rng)
+
+
+def main_hand(takes: TakeSet) -> Hand:
+    """The hand that most takes of a set have."""
+    (name, _), *_ = Counter(captured.hand.name for captured in takes.hands).most_common()
+    return next(captured.hand for captured in takes.hands if captured.hand.name == name)
+
+
+def _in_frames(hands: Sequence[CapturedHand], model: Hand) -> list[CapturedHand]:
+    """The same takes, with the bones' frames of the model's hand."""
+    turned: dict[bytes, Hand] = {}
+    for captured in hands:
+        if (key := captured.hand.packed.tobytes()) not in turned:
+            turned[key] = in_frames_of(captured.hand, model)
+    return [replace(captured, hand=turned[captured.hand.packed.tobytes()]) for captured in hands]
+
+
+def _thinned(sets: Sequence[TakeSet], config: TrainConfig, share: float) -> list[float]:
+    """For each set the share of the recipe's samples per frame with which a round has the size that it may have."""
+    frames = np.array([sum(high - low for low, high in spans_of(each.hands, share)) for each in sets])
+    weights = np.array([each.weight for each in sets])
+    per_frame = config.captured + config.blended + config.on_policy
+    whole = min(config.round_samples, per_frame * frames.sum())
+    return list(whole * weights / weights.sum() / (per_frame * frames))
 
 
 def spans_of(hands: Sequence[CapturedHand], share: float) -> list[tuple[int, int]]:

@@ -1,8 +1,8 @@
-"""`manipnet train`: trains a model on captured takes, and writes a bundle."""
+"""`manipnet train`: trains a model on captured or generated takes, and writes a bundle."""
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -11,12 +11,12 @@ import torch
 
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.layout import layout_of
-from manipnet_tools.takes.sources import licence_of
 from manipnet_tools.training.config import TrainConfig
-from manipnet_tools.training.dataset import CapturedHand, Samples, load_captured_hands
+from manipnet_tools.training.dataset import Samples, TakeSet, load_captured_hands
 from manipnet_tools.training.model import ManipNet, normalisation
 from manipnet_tools.training.options import TrainOptions
 from manipnet_tools.training.sampler import RoundSampler
+from manipnet_tools.training.start import Start, read_start
 from manipnet_tools.training.trained import Trained, save_bundle
 
 _log = logging.getLogger(__name__)
@@ -25,13 +25,11 @@ _log = logging.getLogger(__name__)
 class Trainer:
     """Trains one model, round by round, at a falling learning rate."""
 
-    def __init__(self, hand: Hand, first: Samples, config: TrainConfig) -> None:
-        """The normalisation is taken from the `first` samples."""
-        layout = layout_of(hand)
-        norm = normalisation(layout, first.inputs, first.outputs, config.predict_change)
+    def __init__(self, model: ManipNet, config: TrainConfig) -> None:
+        """Go on from the weights of `model`."""
         self._config = config
         self._rng = np.random.default_rng(config.seed)
-        self._last = ManipNet(layout, norm, config.width, config.dropout, config.architecture, config.hidden)
+        self._last = model
         self._average = torch.optim.swa_utils.AveragedModel(
             self._last, multi_avg_fn=torch.optim.swa_utils.get_ema_multi_avg_fn(config.weight_average)
         )
@@ -76,18 +74,31 @@ class Trainer:
         return torch.nn.functional.mse_loss(predicted, wanted)
 
 
-def train(hands: Sequence[CapturedHand], config: TrainConfig, share: float = 1.0) -> Trained:
-    """Train on the first `share` of each take.
+def new_model(hand: Hand, first: Samples, config: TrainConfig) -> ManipNet:
+    """A model with random weights; its normalisation is taken from the `first` samples."""
+    layout = layout_of(hand)
+    norm = normalisation(layout, first.inputs, first.outputs, config.predict_change)
+    return ManipNet(layout, norm, config.width, config.dropout, config.architecture, config.hidden)
+
+
+def train(
+    sets: Sequence[TakeSet],
+    config: TrainConfig,
+    share: float = 1.0,
+    start: Start | None = None,
+    after_round: Callable[[Trained], None] = lambda trained: None,
+) -> Trained:
+    """Train on the first `share` of each take, from the weights of `start` or from random ones.
 
     The same seed gives the same result. Training uses one thread, because with the small batches that train best, a
-    second thread mostly waits.
+    second thread mostly waits. `after_round` receives the model as it is after each round.
     """
     started = time.monotonic()
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
-    sampler = RoundSampler(hands, config, share)
-    samples = sampler.next_round(None)
-    trainer = Trainer(sampler.hand, samples, config)
+    sampler = RoundSampler(sets, config, share, None if start is None else start.hand)
+    samples = sampler.next_round(None if start is None else start.network)
+    trainer = Trainer(new_model(sampler.hand, samples, config) if start is None else start.network, config)
     for turn in range(config.rounds):
         if turn:
             samples = sampler.next_round(trainer.model)
@@ -95,25 +106,29 @@ def train(hands: Sequence[CapturedHand], config: TrainConfig, share: float = 1.0
         elapsed_s = time.monotonic() - started
         text = "round %d/%d  %d samples  loss %.4f  %.0f s"
         _log.info(text, turn + 1, config.rounds, len(samples), loss, elapsed_s)
-    return trained(trainer, sampler, hands, config, share, time.monotonic() - started)
+        after_round(trained(trainer, sampler, sets, config, share, elapsed_s))
+    return trained(trainer, sampler, sets, config, share, time.monotonic() - started)
 
 
 def trained(
     trainer: Trainer,
     sampler: RoundSampler,
-    hands: Sequence[CapturedHand],
+    sets: Sequence[TakeSet],
     config: TrainConfig,
     share: float,
     seconds: float,
 ) -> Trained:
     """The model as it is now, with everything else that a bundle needs."""
-    takes = tuple(sorted({captured.name.split("/")[0] for captured in hands}))
+    takes = tuple(sorted({captured.name.split("/")[0] for each in sets for captured in each.hands}))
     model, rest_angles, limits = trainer.model.eval(), sampler.rest_angles, sampler.limits
     return Trained(model, sampler.hand, rest_angles, limits, config, takes, share, seconds)
 
 
 def run(options: TrainOptions) -> None:
-    """Train and write the bundle. Raises `DataError`, `TakeError` and `MeshError`."""
-    names = options.takes()
-    trained = train(load_captured_hands(options.data, names), options.training, options.share)
-    save_bundle(replace(trained, licence=licence_of(options.data, names)), options.out)
+    """Train and write the bundle. Raises `BundleError`, `DataError`, `TakeError` and `MeshError`."""
+    config, start = options.training, None
+    if options.start is not None:
+        start, config = read_start(options.start, config)
+    sets = [TakeSet(load_captured_hands(each.path, each.takes), each.weight) for each in options.folders()]
+    licence = options.licence()
+    train(sets, config, options.share, start, lambda now: save_bundle(replace(now, licence=licence), options.out))
