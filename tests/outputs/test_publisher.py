@@ -7,6 +7,7 @@ from contextlib import ExitStack
 import pytest
 import zmq
 from publisher import message
+from raw_subscriber import PATIENCE_S, SUBSCRIBE, UNSUBSCRIBE, RawSubscriber
 
 from manipnet.config.settings import ServerConfig
 from manipnet.control.dispatcher import Dispatcher
@@ -28,6 +29,7 @@ from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
 from manipnet.outputs.websocket import WebSocketOptions
 from manipnet.outputs.zeromq import ZmqOutputOptions
+from manipnet.outputs.zeromq.subscriptions import FORGET_AFTER_S, Subscriptions
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
@@ -107,6 +109,31 @@ def test_a_subscriber_that_does_not_read_does_not_affect_the_others(publisher, c
         while stopped.poll(0):
             kept += len(stopped.recv())
     assert kept < MOST_KEPT_BYTES
+
+
+def test_a_stranger_who_unsubscribes_takes_the_hands_from_nobody(publisher, context):
+    with subscriber(context, publisher.addresses["hands"], TOPIC_BIN) as sub:
+        seq = publish_until_heard(publisher, [sub])
+        while seq_of(sub) < seq - 1:
+            pass
+        stranger = RawSubscriber(publisher.addresses["hands"])
+        stranger.send(UNSUBSCRIBE + TOPIC_BIN)
+        stranger.send(SUBSCRIBE + TOPIC_MSGPACK)
+        while not stranger.has_received:  # until the publisher has read both
+            publisher.publish(message(seq, seq / 60, 0.1))
+            assert sub.poll(int(1e3 * PATIENCE_S)), "the hands have stopped"
+            assert seq_of(sub) == seq
+            seq += 1
+        stranger.close()
+
+
+def test_subscriptions_are_forgotten_when_nobody_has_been_connected_for_a_while():
+    subscriptions = Subscriptions()
+    subscriptions.note(b"\x01pose/", 1.0)
+    in_time_s = 50.0 + FORGET_AFTER_S
+    for connected, now_s, known in ((0, 2.0, True), (1, 50.0, True), (0, in_time_s, True), (0, in_time_s + 1.0, False)):
+        subscriptions.count(connected, now_s)
+        assert subscriptions.include(TOPIC_MSGPACK) == known
 
 
 def pair():

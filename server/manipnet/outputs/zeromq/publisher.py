@@ -8,14 +8,13 @@ from manipnet.net.curve_keys import ServerKeys
 from manipnet.net.supervised import Pauses, ReceiverHealth
 from manipnet.net.zmq_socket import BoundSocket
 from manipnet.outputs.declaration import EncodedHands, HandsOutput
+from manipnet.outputs.zeromq.subscriptions import Subscriptions
 from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.telemetry import Telemetry
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, hand_topics
 
 MAX_SUBSCRIPTION_BYTES = 1024
 """Subscriptions, and the handshake of CURVE, are all that clients send."""
-MAX_SUBSCRIPTIONS = 4096
-"""Prefixes of topics that are remembered; beyond them, nobody's subscription to an avatar is noticed."""
 READ_AT_ONCE = 256
 """Subscriptions that are read at one call."""
 
@@ -30,8 +29,7 @@ class ZmqPublisher(HandsOutput):
         self.address = self._bound.address
         self._health, self._pauses = ReceiverHealth("hands", telemetry), Pauses()
         self._pauses.opened()
-        self._subscribed: set[bytes] = set()
-        """The prefixes of topics that clients have subscribed to."""
+        self._subscriptions = Subscriptions()
         self._retry_s: float | None = None
         """When the socket, which has failed, is opened again."""
 
@@ -44,9 +42,9 @@ class ZmqPublisher(HandsOutput):
             return False
         self._read_subscriptions()
         try:
-            if self._is_subscribed(TOPIC_MSGPACK):
+            if self._subscriptions.include(TOPIC_MSGPACK):
                 self._bound.socket.send(TOPIC_MSGPACK + hands.msgpack)
-            if self._is_subscribed(TOPIC_BIN):
+            if self._subscriptions.include(TOPIC_BIN):
                 self._bound.socket.send(TOPIC_BIN + hands.binary)
         except zmq.ZMQError as error:
             self._bound.close()
@@ -57,7 +55,7 @@ class ZmqPublisher(HandsOutput):
     def wants(self, avatar: str) -> bool:
         """Whether a client has subscribed to a topic of the avatar, or to a prefix of it."""
         self._read_subscriptions()
-        return any(self._is_subscribed(topic) for topic in hand_topics(avatar))
+        return any(self._subscriptions.include(topic) for topic in hand_topics(avatar))
 
     def send_avatar(self, hands: EncodedHands, profile: HandProfile) -> bool:
         """Publish the hands of an avatar under those of its topics that have subscribers."""
@@ -65,35 +63,26 @@ class ZmqPublisher(HandsOutput):
             return False
         try:
             msgpack_topic, binary_topic = hand_topics(profile.name)
-            if self._is_subscribed(msgpack_topic):
+            if self._subscriptions.include(msgpack_topic):
                 self._bound.socket.send(msgpack_topic + hands.msgpack)
-            if self._is_subscribed(binary_topic):
+            if self._subscriptions.include(binary_topic):
                 self._bound.socket.send(binary_topic + hands.binary)
         except zmq.ZMQError as error:
             self._bound.close()
             self._fail(error)
         return False
 
-    def _is_subscribed(self, topic: bytes) -> bool:
-        if len(self._subscribed) >= MAX_SUBSCRIPTIONS and topic in (TOPIC_MSGPACK, TOPIC_BIN):
-            return True  # the subscription may be one of those that were not remembered
-        return any(topic.startswith(prefix) for prefix in self._subscribed)
-
     def _read_subscriptions(self) -> None:
-        """Note what clients have subscribed to since the last call, and what none of them subscribes to any longer."""
+        """Note what clients have subscribed to since the last call, and whether any is connected."""
         if self._retry_s is not None:
             return
+        now_s = time.monotonic()
+        self._subscriptions.count(self._bound.connected(), now_s)
         try:
             for _ in range(READ_AT_ONCE):
-                if (
-                    not int(self._bound.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN
-                ):  # an exception would cost ten times more
-                    return
-                message = self._bound.socket.recv(zmq.NOBLOCK)
-                if message[:1] == b"\x01" and len(self._subscribed) < MAX_SUBSCRIPTIONS:
-                    self._subscribed.add(message[1:])
-                elif message[:1] == b"\x00":
-                    self._subscribed.discard(message[1:])
+                if not int(self._bound.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
+                    return  # reading would raise an exception, which costs ten times more
+                self._subscriptions.note(self._bound.socket.recv(zmq.NOBLOCK), now_s)
         except zmq.Again:
             pass
         except zmq.ZMQError as error:
@@ -113,7 +102,7 @@ class ZmqPublisher(HandsOutput):
 
     def _fail(self, error: Exception) -> None:
         self._health.down(error)
-        self._subscribed.clear()
+        self._subscriptions.clear()
         self._retry_s = time.monotonic() + self._pauses.next_s()
 
     def _reopened(self) -> bool:
