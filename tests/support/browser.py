@@ -3,6 +3,7 @@
 import base64
 import functools
 import http.server
+import io
 import itertools
 import json
 import os
@@ -15,6 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from PIL import Image
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
@@ -141,6 +144,17 @@ class Page:
               dispatchEvent(new DragEvent("drop", {{dataTransfer: carried}}));
             }})()"""
         )
+
+    def give_file(self, file: Path) -> None:
+        """Choose a file in the field of the page that takes one."""
+        root = self.call("DOM.getDocument")["root"]["nodeId"]
+        field = self.call("DOM.querySelector", nodeId=root, selector="input[type=file]")["nodeId"]
+        self.call("DOM.setFileInputFiles", nodeId=field, files=[str(file)])
+
+    def picture(self) -> np.ndarray:
+        """What the page looks like, `(height, width, 3)`."""
+        content = base64.b64decode(self.call("Page.captureScreenshot")["data"])
+        return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
 
     def screenshot(self, path: Path) -> None:
         """What the page looks like, as PNG."""
