@@ -1,8 +1,8 @@
 """Record the moving pictures of the live page: `python docs/record_page.py [NAME …]` rewrites `docs/images/NAME.webp`.
 
-A real server plays its demo and records it. A headless Chromium then opens the recording on the page and steps through it
-picture by picture, so that the result runs at the true speed although the browser draws in software. It needs Chromium
-and Pillow, and takes some ten minutes for all pictures.
+A real server plays its demo and records it. A headless Chromium then opens the recording on the page and steps through
+it picture by picture, so that the result runs at the true speed although the browser draws in software. It needs
+Chromium and Pillow, and takes some ten minutes for all pictures.
 """
 
 import base64
@@ -29,7 +29,7 @@ PATIENCE_S = 240.0
 DEMO_S = 42.5
 SETTLE_S = 4.0
 """The camera reaches what it follows in this time."""
-SHAPES = ("--mesh", "cube=sphere", "--mesh", "cylinder=bottle", "--mesh", "mug=wine_glass")
+SHAPES = ("--mesh", "cylinder=bottle", "--mesh", "mug=wine_glass")
 
 
 @dataclass(frozen=True)
@@ -43,17 +43,15 @@ class Clip:
     shown: tuple[int, int] = (440, 352)
     whole: bool = False
     """Whether the panel is in the picture, and the camera follows; otherwise it is the stage, and the camera stands."""
-    rate_hz: float = 12.0
+    rate_hz: float = 10.0
 
 
 CLIPS = {
-    "page": Clip((), (27.5, 40.0), (1200, 600), (960, 480), whole=True),
-    "take-cube": Clip((), (4.0, 9.0)),
-    "take-cylinder": Clip((), (17.0, 22.0)),
-    "take-mug": Clip((), (30.5, 35.5)),
-    "take-sphere": Clip(SHAPES, (4.0, 9.0)),
-    "take-bottle": Clip(SHAPES, (17.0, 22.0)),
-    "take-glass": Clip(SHAPES, (30.5, 35.5)),
+    "page": Clip((), (28.0, 39.0), (1200, 600), (960, 480), whole=True),
+    "take-cube": Clip((), (5.0, 9.0)),
+    "take-cylinder": Clip((), (18.0, 22.0)),
+    "take-bottle": Clip(SHAPES, (18.0, 22.0)),
+    "take-glass": Clip(SHAPES, (31.5, 35.5)),
 }
 
 
@@ -64,9 +62,11 @@ def main(names: list[str]) -> None:
         with serving("--demo", *options, "--takes", str(takes)) as server:
             record(server)
             for name in group:
-                with tempfile.TemporaryDirectory() as profile:
-                    with browsing("chromium", server.addresses["page"], Path(profile)) as page:
-                        write(name, list(pictures(page, CLIPS[name])))
+                with (
+                    tempfile.TemporaryDirectory() as profile,
+                    browsing("chromium", server.addresses["page"], Path(profile)) as page,
+                ):
+                    write(name, list(pictures(page, CLIPS[name])))
         (takes / f"{TAKE}.mcap").unlink()
 
 

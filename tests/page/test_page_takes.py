@@ -103,9 +103,7 @@ def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> N
     studio.until(lambda _: copy.exists() and copy.stat().st_size == (studio.takes / copy.name).stat().st_size)
     page.click("Delete …")
     page.click("Keep it", PATIENCE_S)
-    page.wait_for(
-        "document.querySelector('[role=dialog]') === null", PATIENCE_S
-    )  # it fades, and takes clicks meanwhile
+    page.wait_for("document.querySelector('[role=dialog]') === null", PATIENCE_S)  # it fades over the page
     page.click("Delete …")
     page.click("Delete it", PATIENCE_S)
     studio.until(lambda _: [file.name for file in studio.takes.iterdir()] == ["spare.mcap"])

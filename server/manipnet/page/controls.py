@@ -27,7 +27,7 @@ def by_visitor(action: Callable[[], None]) -> Callable[[viser.GuiEvent[Any]], No
 
 
 def remembered(client: viser.ClientHandle, key: str) -> str | None:
-    """What a visitor's browser has kept under a key; waits for its answer. None if it kept nothing or does not answer."""
+    """What a visitor's browser has kept under a key; waits for it. None if it kept nothing or does not answer."""
     try:
         return client.local_storage.get_item(key, ANSWER_S)
     except (RuntimeError, TimeoutError):  # he has left, or his browser stores nothing

@@ -1,4 +1,4 @@
-"""Named presets: what a visitor sees, the look-ahead, and what the bodies carry. They are kept in the visitor's browser."""
+"""Presets: what a visitor sees, the look-ahead, and what the bodies carry, under a name and kept in his browser."""
 
 import json
 import math
