@@ -1,4 +1,4 @@
-"""Install the wheels into a new environment, as a user and the Dockerfile do: `python .ci/smoke.py WHEEL FULL_WIDTH_WHEEL`.
+"""Install the wheels as a user and the Dockerfile do: `python .ci/smoke.py WHEEL FULL_WIDTH_WHEEL`.
 
 The demo is started with the command of the container.
 """
