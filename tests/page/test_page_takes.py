@@ -21,6 +21,9 @@ def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Stud
     page = studio.page
     page.click("Takes")
     page.type("Slate", "12A")
+    page.type("Number", "3")
+    studio.says("Record makes: 12A take 3")
+    page.type("Number", "1")
     studio.says("Record makes: 12A take 1")
     page.click("Next take")  # leaves the field
     page.key("r")

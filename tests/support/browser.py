@@ -91,7 +91,10 @@ class Page:
         """Replace what is in one of the fields of a label, and press Enter unless told otherwise."""
         find = _BY_LABEL.replace('"input"', json.dumps(field))
         self.press(self.wait_for(f"({_CENTER})({find})({json.dumps(label)}, {number})"), times=3)
-        self.call("Input.insertText", text=text)
+        if text:
+            self.call("Input.insertText", text=text)
+        else:
+            self.key("Backspace")
         if enter:
             self.key("Enter")
 
@@ -100,6 +103,7 @@ class Page:
         letter = len(key) == 1
         named = {
             " ": ("Space", 32),
+            "Backspace": ("Backspace", 8),
             "Enter": ("Enter", 13),
             "ArrowLeft": ("ArrowLeft", 37),
             "ArrowRight": ("ArrowRight", 39),
