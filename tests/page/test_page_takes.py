@@ -7,13 +7,6 @@ from studio import PATIENCE_S, SECOND, TEXT, Studio
 
 from manipnet.recording.mcap_file import read_hands
 
-STOP = """(() => {
-  const button = [...document.querySelectorAll('button')].find(one => one.textContent.startsWith('Stop recording 0:'));
-  if (!button) return null;
-  const {x, y, width, height} = button.getBoundingClientRect();
-  return [x + width / 2, y + height / 2];
-})()"""
-"""Where the button is that stops the recording."""
 NAMED = "[...document.querySelectorAll('input')].filter(one => one.value === '%s').length"
 
 
@@ -29,7 +22,7 @@ def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Stud
     page.key("r")
     page.wait_for("document.querySelector('.mn-recording') !== null", PATIENCE_S)
     studio.says("REC 0:0")
-    page.press(page.wait_for(STOP, PATIENCE_S))
+    page.click("Stop recording 0:", PATIENCE_S, whole=False)
     page.wait_for("document.querySelector('.mn-recording') === null", PATIENCE_S)
     page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === '12A take 1.mcap')", PATIENCE_S)
     take = studio.takes / "12A take 1.mcap"

@@ -34,6 +34,7 @@ _BY_TEXT = f"""text => {{
   const kind = "body *";
   return {_VISIBLE}.filter(says).at(-1);
 }}"""
+_BY_BEGINNING = _BY_TEXT.replace("trim() === text", "trim().startsWith(text)")
 _BY_OPTION = f"""text => {{
   const kind = "[role=option]";
   return {_VISIBLE}.find(one => one.textContent.trim() === text);
@@ -83,9 +84,10 @@ class Page:
             for kind in ("mousePressed", "mouseReleased"):
                 self.call("Input.dispatchMouseEvent", type=kind, clickCount=count, **at)
 
-    def click(self, text: str, limit_s: float = 30.0) -> None:
-        """Click the element with exactly this text, once it exists."""
-        self.press(self.wait_for(f"({_CENTER})({_BY_TEXT})({json.dumps(text)}, 0)", limit_s))
+    def click(self, text: str, limit_s: float = 30.0, whole: bool = True) -> None:
+        """Click the element with exactly this text, once it exists, or with a text that begins like this."""
+        find = _BY_TEXT if whole else _BY_BEGINNING
+        self.press(self.wait_for(f"({_CENTER})({find})({json.dumps(text)}, 0)", limit_s))
 
     def type(self, label: str, text: str, number: int = 0, field: str = "input", enter: bool = True) -> None:
         """Replace what is in one of the fields of a label, and press Enter unless told otherwise."""
