@@ -2,7 +2,7 @@
 
 A real server plays its demo and records it. A headless Chromium then opens the recording on the page and steps through
 it picture by picture, so that the result runs at the true speed although the browser draws in software. It needs
-Chromium and Pillow, and takes some ten minutes for all pictures.
+Chromium and the extra `dev`, and takes some ten minutes for all pictures.
 """
 
 import base64
