@@ -7,7 +7,7 @@ COPY pyproject.toml constraints.txt README.md LICENSE ./
 COPY server server
 COPY tools tools
 COPY models models
-RUN pip install --no-cache-dir -c constraints.txt .
+RUN pip install --no-cache-dir -c constraints.txt . ./models
 
 USER manipnet
 WORKDIR /home/manipnet

@@ -1,4 +1,7 @@
-"""Install the wheels into a new environment, as a user would: `python .ci/smoke.py WHEEL FULL_WIDTH_WHEEL`."""
+"""Install the wheels as a user and the Dockerfile do: `python .ci/smoke.py WHEEL FULL_WIDTH_WHEEL`.
+
+The demo is started with the command of the container.
+"""
 
 import os
 import subprocess
@@ -7,6 +10,8 @@ import tempfile
 import threading
 import venv
 from pathlib import Path
+
+import container
 
 FREE_PORTS = [f"--{name}-port=0" for name in ("input", "control", "osc", "page", "web")] + ["--port=0"]
 START_S = 300.0
@@ -30,7 +35,8 @@ def main(wheel: str, full_width_wheel: str) -> None:
         assert not missing, f"the wheel's metadata lacks {missing}"
         for arguments in (["--help"], ["doctor", "--help"], ["replay", "--help"]):
             subprocess.run([programs / "manipnet", *arguments], stdout=subprocess.DEVNULL, check=True, cwd=folder)
-        start_demo([str(programs / "manipnet-serve"), "--demo", *FREE_PORTS], folder)
+        program, *arguments = container.command()
+        start_demo([str(programs / program), *arguments, *FREE_PORTS], folder)
         add_full_width(programs, full_width_wheel)
 
 

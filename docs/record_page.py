@@ -1,8 +1,8 @@
-"""Record the moving picture of the live page: `python docs/record_page.py` rewrites `docs/images/page.webp`.
+"""Record the moving pictures of the live page: `python docs/record_page.py [NAME …]` rewrites `docs/images/NAME.webp`.
 
-A real server plays its demo and records part of it. A headless Chromium then opens the recording on the page and steps
-through it picture by picture, so that the result runs at the true speed although the browser draws in software. It
-needs Chromium and Pillow, and takes about five minutes.
+A real server plays its demo and records it. A headless Chromium then opens the recording on the page and steps through
+it picture by picture, so that the result runs at the true speed although the browser draws in software. It needs
+Chromium and the extra `dev`, and takes some ten minutes for all pictures.
 """
 
 import base64
@@ -10,6 +10,9 @@ import io
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 from PIL import Image
@@ -19,49 +22,72 @@ sys.path.append(str(DOCS.parent / "tests" / "support"))
 
 from browser import Page, browsing  # noqa: E402
 from live_server import LiveServer, serving  # noqa: E402
+from studio import DISMISS, PLACE, TEXT  # noqa: E402
 
-TAKE = "mug"
-PERFORMED_S = (27.5, 40.0)
-"""The part of the demo to show, in seconds after its start; it ends nearly as it begins."""
-RATE_HZ = 12.0
-WINDOW = (1200, 600)
-SHOWN = (960, 480)
-ZOOM_STEPS, DOWN_PX = 2, 125
-"""How far the camera goes in, and the scene down, from where the page puts them."""
+TAKE = "demo"
 PATIENCE_S = 240.0
-TEXT = "document.body.innerText"
-DISMISS = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(button => button.click())"
+DEMO_S = 42.5
+SETTLE_S = 4.0
+"""The camera reaches what it follows in this time."""
+SHAPES = ("--mesh", "cylinder=bottle", "--mesh", "mug=wine_glass")
 
 
-def main() -> None:
-    """Record, step through the recording, and write the picture."""
+@dataclass(frozen=True)
+class Clip:
+    """A part of the demo, played by a server with some options."""
+
+    options: tuple[str, ...]
+    performed_s: tuple[float, float]
+    """Seconds after the start of the demo."""
+    window: tuple[int, int] = (880, 440)
+    shown: tuple[int, int] = (440, 352)
+    whole: bool = False
+    """Whether the panel is in the picture, and the camera follows; otherwise it is the stage, and the camera stands."""
+    rate_hz: float = 10.0
+
+
+CLIPS = {
+    "page": Clip((), (28.0, 39.0), (1200, 600), (960, 480), whole=True),
+    "take-cube": Clip((), (5.0, 9.0)),
+    "take-cylinder": Clip((), (18.0, 22.0)),
+    "take-bottle": Clip(SHAPES, (18.0, 22.0)),
+    "take-glass": Clip(SHAPES, (31.5, 35.5)),
+}
+
+
+def main(names: list[str]) -> None:
+    """Record, step through the recording, and write the pictures with these names."""
     takes = Path(tempfile.gettempdir()) / "takes"  # the page shows its name
-    with tempfile.TemporaryDirectory() as profile, serving("--demo", "--takes", str(takes)) as server:
-        seconds = record(server)
-        with browsing("chromium", server.addresses["page"], Path(profile)) as page:
-            set_up(page)
-            pictures = [picture(page, k / RATE_HZ) for k in range(1, int(seconds * RATE_HZ))]  # it opened at 0
-    (takes / f"{TAKE}.mcap").unlink()
-    file = DOCS / "images" / "page.webp"
-    pictures[0].save(
-        file, save_all=True, append_images=pictures[1:], duration=round(1e3 / RATE_HZ), loop=0, quality=80, method=6
-    )
-    print(f"wrote {file}: {len(pictures)} pictures, {file.stat().st_size / 1e6:.1f} MB")
+    for options, group in groupby(names or CLIPS, key=lambda name: CLIPS[name].options):
+        with serving("--demo", *options, "--takes", str(takes)) as server:
+            record(server)
+            for name in group:
+                with (
+                    tempfile.TemporaryDirectory() as profile,
+                    browsing("chromium", server.addresses["page"], Path(profile)) as page,
+                ):
+                    write(name, list(pictures(page, CLIPS[name])))
+        (takes / f"{TAKE}.mcap").unlink()
 
 
-def record(server: LiveServer) -> float:
-    """Let the server record the part of its demo; the length in seconds."""
+def record(server: LiveServer) -> None:
+    """Let the server record its demo once."""
     began_s = time.monotonic()
-    answer = {}
-    for at_s, request in zip(PERFORMED_S, ({"op": "record", "name": TAKE}, {"op": "stop_recording"}), strict=True):
-        time.sleep(max(began_s + at_s - time.monotonic(), 0.0))
-        answer = server.ask(request)
-    return float(answer["seconds"])
+    assert server.ask({"op": "record", "name": TAKE})["name"]
+    time.sleep(max(began_s + DEMO_S - time.monotonic(), 0.0))
+    server.ask({"op": "stop_recording"})
 
 
-def set_up(page: Page) -> None:
-    """Open the recording on the page, with the health panel folded away and the camera a little nearer."""
-    width, height = WINDOW
+def write(name: str, images: list[Image.Image]) -> None:
+    """Write pictures as one that moves."""
+    file, pause_ms = DOCS / "images" / f"{name}.webp", round(1e3 / CLIPS[name].rate_hz)
+    images[0].save(file, save_all=True, append_images=images[1:], duration=pause_ms, loop=0, quality=78, method=6)
+    print(f"wrote {file}: {len(images)} pictures, {file.stat().st_size / 1e6:.2f} MB", flush=True)
+
+
+def pictures(page: Page, clip: Clip) -> Iterator[Image.Image]:
+    """Open the recording with the health panel folded away, and step through the clip."""
+    width, height = clip.window
     page.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
     page.wait_for(f"{TEXT}.includes('hands/s') && document.title === 'ManipNet Live'", PATIENCE_S)
     page.evaluate(DISMISS)
@@ -70,28 +96,34 @@ def set_up(page: Page) -> None:
     page.wait_for(f"[...document.querySelectorAll('input')].some(field => field.value === '{TAKE}.mcap')", PATIENCE_S)
     page.click("Show this take", PATIENCE_S)
     page.wait_for(f"{TEXT}.includes('Time, s')", PATIENCE_S)
-    x, y = 420.0, 250.0
-    for _ in range(ZOOM_STEPS):
-        page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-100)
-        time.sleep(1.0)
-    drag(page, (x, y), (x, y + DOWN_PX))
+    first_s, last_s = clip.performed_s
+    show(page, first_s if clip.whole else 0.5 * (first_s + last_s), SETTLE_S)
+    if not clip.whole:
+        page.drag((300.0, 200.0), (300.0, 200.5))  # takes the camera
+    page.evaluate(DISMISS)
+    for k in range(round((last_s - first_s) * clip.rate_hz)):
+        show(page, first_s + k / clip.rate_hz, 0.7)  # the browser draws once or twice in this time
+        yield picture(page, clip)
 
 
-def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
-    """Drag with the right button, which moves the camera sideways."""
-    for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
-        page.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="right", buttons=2, clickCount=1)
-        time.sleep(0.5)
-
-
-def picture(page: Page, second: float) -> Image.Image:
-    """What the page looks like at an instant of the recording."""
+def show(page: Page, second: float, wait_s: float) -> None:
+    """Show an instant of the recording."""
     page.type("Time, s", f"{second:.2f}")
-    time.sleep(0.7)  # the browser draws once or twice in this time
+    time.sleep(wait_s)
     page.evaluate("document.activeElement.blur()")
+
+
+def picture(page: Page, clip: Clip) -> Image.Image:
+    """What the page looks like."""
     screenshot = base64.b64decode(page.call("Page.captureScreenshot")["data"])
-    return Image.open(io.BytesIO(screenshot)).convert("RGB").resize(SHOWN, Image.Resampling.LANCZOS)
+    image = Image.open(io.BytesIO(screenshot)).convert("RGB")
+    if not clip.whole:
+        left, top, width, height = page.evaluate(PLACE)
+        wide = min(width, height * clip.shown[0] / clip.shown[1])
+        middle = left + 0.5 * width
+        image = image.crop((round(middle - 0.5 * wide), round(top), round(middle + 0.5 * wide), round(top + height)))
+    return image.resize(clip.shown, Image.Resampling.LANCZOS)
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -69,7 +69,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("slow")
         if "manipnet_data" in fixtures:
             item.add_marker("dataset")
-        if "stage" in fixtures or STARTS_PROCESSES & vars(module).keys():
+        if {"stage", "studio"} & set(fixtures) or STARTS_PROCESSES & vars(module).keys():
             item.add_marker("process")
         if not {"client", "dataset", "process", "slow"} & {marker.name for marker in item.iter_markers()}:
             item.add_marker("quick")
@@ -108,9 +108,8 @@ def stage(tiny_bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
     One per module: starting it takes seconds. `stage.perform` plays each performance at a later time.
     """
     dumps = tmp_path_factory.mktemp("dumps")
-    with serving(
-        "--mesh", f"Box={LIBRARY_FOLDER / 'cube.ply'}", "--model", str(tiny_bundle), "--dump-dir", str(dumps)
-    ) as server:
+    folders = ("--dump-dir", str(dumps), "--takes", str(dumps / "takes"))
+    with serving("--mesh", f"Box={LIBRARY_FOLDER / 'cube.ply'}", "--model", str(tiny_bundle), *folders) as server:
         stage = Stage(server)
         yield stage
         stage.close()

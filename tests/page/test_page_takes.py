@@ -1,22 +1,28 @@
 """Takes on the live page: recorded, shown, described, downloaded, renamed and deleted in a real browser."""
 
+import json
+
 from browser import another
 from studio import PATIENCE_S, SECOND, TEXT, Studio
 
 from manipnet.recording.mcap_file import read_hands
+
+NAMED = "[...document.querySelectorAll('input')].filter(one => one.value === '%s').length"
 
 
 def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Studio) -> None:
     page = studio.page
     page.click("Takes")
     page.type("Slate", "12A")
+    page.type("Number", "3")
+    studio.says("Record makes: 12A take 3")
+    page.type("Number", "1")
     studio.says("Record makes: 12A take 1")
     page.click("Next take")  # leaves the field
     page.key("r")
     page.wait_for("document.querySelector('.mn-recording') !== null", PATIENCE_S)
     studio.says("REC 0:0")
-    page.wait_for("document.body.innerText.includes('Stop recording 0:0')", PATIENCE_S)
-    page.key("r")
+    page.click("Stop recording 0:", PATIENCE_S, whole=False)
     page.wait_for("document.querySelector('.mn-recording') === null", PATIENCE_S)
     page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === '12A take 1.mcap')", PATIENCE_S)
     take = studio.takes / "12A take 1.mcap"
@@ -46,6 +52,19 @@ def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Stud
     studio.says("● Live")
 
 
+def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> None:
+    page = studio.page
+    page.click("Takes")
+    page.type("Slate", "", enter=False)
+    studio.says("Record makes: take, with date and time")
+    page.click("Record")
+    page.wait_for("document.querySelector('.mn-recording') !== null", PATIENCE_S)
+    page.key("r")
+    page.wait_for("document.querySelector('.mn-recording') === null", PATIENCE_S)
+    (dated,) = studio.takes.glob("take *.mcap")
+    dated.rename(studio.takes / "spare.mcap")
+
+
 def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
     page = studio.page
     page.click("Takes")
@@ -55,3 +74,32 @@ def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
     page.click("Keep changes")
     studio.says("note kept")
     assert studio.server.ask({"op": "recordings"})["recording"] is None
+
+
+def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> None:
+    page = studio.page
+    page.click("Takes")
+    page.choose("Take", "spare.mcap")
+    page.wait_for(NAMED % "spare", PATIENCE_S)
+    page.choose("Take", "12A take 1.mcap")
+    page.wait_for(NAMED % "12A take 1", PATIENCE_S)
+    for name in ("b", "be"):
+        page.type("Name", name, enter=False)
+    assert not list(studio.takes.glob("b*"))  # not renamed letter by letter
+    page.type("Name", "best of all", enter=False)
+    page.type("Its slate", "12B", enter=False)
+    page.type("Its number", "3", enter=False)
+    page.click("Keep changes")
+    studio.until(lambda _: (studio.takes / "best of all.mcap").exists())
+    notes = json.loads((studio.takes / "best of all.json").read_text())
+    assert notes == {"slate": "12B", "number": 3, "note": "ran r rr"}
+    page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(studio.rig.parent))
+    page.click("Download")
+    copy = studio.rig.parent / "best of all.mcap"
+    studio.until(lambda _: copy.exists() and copy.stat().st_size == (studio.takes / copy.name).stat().st_size)
+    page.click("Delete …")
+    page.click("Keep it", PATIENCE_S)
+    page.wait_for("document.querySelector('[role=dialog]') === null", PATIENCE_S)  # it fades over the page
+    page.click("Delete …")
+    page.click("Delete it", PATIENCE_S)
+    studio.until(lambda _: [file.name for file in studio.takes.iterdir()] == ["spare.mcap"])

@@ -1,5 +1,6 @@
 """What a visitor of the live page sees: camera, theme, and the layout on a tablet."""
 
+import pytest
 from studio import FOLLOWING, PATIENCE_S, STAGE, TEXT, Studio
 
 CONTROLS = ("View", "Objects", "Hands", "Takes", "Calibrate")
@@ -8,6 +9,14 @@ TABS = f"{MAIN_TABS}.map(one => [one.textContent, one.getBoundingClientRect().to
 """The tabs that are visible, and how far from the top they begin."""
 WIDE_TABS = f"{MAIN_TABS}.filter(one => one.getBoundingClientRect().right > innerWidth).length"
 """How many tabs reach beyond the window."""
+
+NAMED = "[...document.querySelectorAll('input')].filter(one => one.value === '%s').length"
+CONTACTS = """(() => {
+  let row = [...document.querySelectorAll('label')].find(one => one.textContent.trim() === 'Contacts');
+  while (!row.querySelector('input[type=checkbox]')) row = row.parentElement;
+  return row.querySelector('input[type=checkbox]').checked;
+})()"""
+"""Whether the layer is on."""
 
 
 def test_the_camera_is_taken_and_given_back(studio: Studio) -> None:
@@ -18,6 +27,10 @@ def test_the_camera_is_taken_and_given_back(studio: Studio) -> None:
     page.drag((x, y + 120), (x + 90, y + 150))
     page.wait_for(f"!{FOLLOWING}", PATIENCE_S)
     page.click("Follow the hands")
+    page.wait_for(f"{FOLLOWING}", PATIENCE_S)
+    page.drag((x, y + 120), (x - 90, y + 150))
+    page.wait_for(f"!{FOLLOWING}", PATIENCE_S)
+    page.key("c")
     page.wait_for(f"{FOLLOWING}", PATIENCE_S)
 
 
@@ -31,6 +44,36 @@ def test_the_theme_is_light_or_dark_and_remembered(studio: Studio) -> None:
     page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
     page.click("Dark theme", PATIENCE_S)
     page.wait_for(f"{scheme} === 'dark'", PATIENCE_S)
+
+
+def test_presets_keep_what_is_seen_and_what_the_bodies_carry(studio: Studio) -> None:
+    page, scheme = studio.page, "document.documentElement.dataset.mantineColorScheme"
+    page.click("View")
+    page.type("Look-ahead, ms", "200")
+    page.tick("Contacts")
+    page.click("Light theme")
+    page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
+    studio.until(lambda message: message.look_ahead == pytest.approx(0.2))
+    page.type("New preset", "day", enter=False)
+    studio.says("200 ms look-ahead")
+    page.click("Save preset")
+    page.wait_for(NAMED % "day", PATIENCE_S)
+    page.click("Dark theme", PATIENCE_S)
+    page.tick("Contacts")
+    page.type("Look-ahead, ms", "300")
+    studio.server.ask({"op": "select_object", "actor": "actor", "body": "Box", "object": "torus"})
+    studio.until(lambda message: message.look_ahead == pytest.approx(0.3))
+    page.call("Page.reload")
+    page.click("View", PATIENCE_S)
+    page.wait_for(NAMED % "day", PATIENCE_S)  # this browser has kept it
+    page.click("Use this preset")
+    studio.until(lambda message: message.look_ahead == pytest.approx(0.2) and studio.box()["object"] == "cube")
+    page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
+    page.wait_for(CONTACTS, PATIENCE_S)
+    page.click("Delete this preset")
+    page.wait_for(NAMED % "none", PATIENCE_S)
+    page.tick("Contacts")
+    page.click("Dark theme")
 
 
 def test_a_tablet_shows_stage_and_controls_side_by_side(studio: Studio) -> None:

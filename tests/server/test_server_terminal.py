@@ -124,12 +124,13 @@ def test_a_pipe_gets_the_ready_line_and_lines_only_for_changes(tiny_bundle: Path
 
 
 def test_a_first_start_says_at_once_that_it_compiles(tiny_bundle: Path, tmp_path: Path) -> None:
-    """It says so before the compiler is loaded, and is stopped then."""
+    """It says so before the compiler is loaded, in one place, and is stopped then."""
     server = Watched("--model", str(tiny_bundle), MANIPNET_CACHE=str(tmp_path / "empty"))
     try:
         watched_for = "first start: code is compiled once"
-        server.until(lambda: watched_for in server.raw)
+        server.until(lambda: f"{watched_for}, which takes some seconds: 1 s so far" in server.raw)
         assert not server.has("ready")
+        assert sum(watched_for in line for line in server.screen.lines) == 1
         assert "WARNING" not in server.raw
     finally:
         server.close()

@@ -3,6 +3,7 @@
 import base64
 import functools
 import http.server
+import io
 import itertools
 import json
 import os
@@ -15,6 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from PIL import Image
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
@@ -31,6 +34,7 @@ _BY_TEXT = f"""text => {{
   const kind = "body *";
   return {_VISIBLE}.filter(says).at(-1);
 }}"""
+_BY_BEGINNING = _BY_TEXT.replace("trim() === text", "trim().startsWith(text)")
 _BY_OPTION = f"""text => {{
   const kind = "[role=option]";
   return {_VISIBLE}.find(one => one.textContent.trim() === text);
@@ -80,15 +84,19 @@ class Page:
             for kind in ("mousePressed", "mouseReleased"):
                 self.call("Input.dispatchMouseEvent", type=kind, clickCount=count, **at)
 
-    def click(self, text: str, limit_s: float = 30.0) -> None:
-        """Click the element with exactly this text, once it exists."""
-        self.press(self.wait_for(f"({_CENTER})({_BY_TEXT})({json.dumps(text)}, 0)", limit_s))
+    def click(self, text: str, limit_s: float = 30.0, whole: bool = True) -> None:
+        """Click the element with exactly this text, once it exists, or with a text that begins like this."""
+        find = _BY_TEXT if whole else _BY_BEGINNING
+        self.press(self.wait_for(f"({_CENTER})({find})({json.dumps(text)}, 0)", limit_s))
 
     def type(self, label: str, text: str, number: int = 0, field: str = "input", enter: bool = True) -> None:
         """Replace what is in one of the fields of a label, and press Enter unless told otherwise."""
         find = _BY_LABEL.replace('"input"', json.dumps(field))
         self.press(self.wait_for(f"({_CENTER})({find})({json.dumps(label)}, {number})"), times=3)
-        self.call("Input.insertText", text=text)
+        if text:
+            self.call("Input.insertText", text=text)
+        else:
+            self.key("Backspace")
         if enter:
             self.key("Enter")
 
@@ -97,6 +105,7 @@ class Page:
         letter = len(key) == 1
         named = {
             " ": ("Space", 32),
+            "Backspace": ("Backspace", 8),
             "Enter": ("Enter", 13),
             "ArrowLeft": ("ArrowLeft", 37),
             "ArrowRight": ("ArrowRight", 39),
@@ -141,6 +150,17 @@ class Page:
               dispatchEvent(new DragEvent("drop", {{dataTransfer: carried}}));
             }})()"""
         )
+
+    def give_file(self, file: Path) -> None:
+        """Choose a file in the field of the page that takes one."""
+        root = self.call("DOM.getDocument")["root"]["nodeId"]
+        field = self.call("DOM.querySelector", nodeId=root, selector="input[type=file]")["nodeId"]
+        self.call("DOM.setFileInputFiles", nodeId=field, files=[str(file)])
+
+    def picture(self) -> np.ndarray:
+        """What the page looks like, `(height, width, 3)`."""
+        content = base64.b64decode(self.call("Page.captureScreenshot")["data"])
+        return np.asarray(Image.open(io.BytesIO(content)).convert("RGB")).astype(int)
 
     def screenshot(self, path: Path) -> None:
         """What the page looks like, as PNG."""

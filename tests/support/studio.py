@@ -4,6 +4,7 @@ import contextlib
 import shutil
 import threading
 import time
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,8 @@ PLACE = """(() => {
   return place.some(Number.isNaN) ? null : place;
 })()"""
 """Left, top, width and height of the stage."""
+DISMISS = "document.querySelectorAll('.mantine-Notification-closeButton').forEach(button => button.click())"
+"""Removes the notifications, which cover part of the stage."""
 COMPLAIN = """
 window.complaints = [];
 addEventListener('error', event => complaints.push(event.message));
@@ -63,8 +66,9 @@ console.error = (...words) => complaints.push(words.join(' '));
 class Studio:
     """A server with a rig, bodies that lie still, what it publishes, and its page in a browser."""
 
-    def __init__(self, server: LiveServer, page: Page, rig: Path, takes: Path) -> None:
-        self.server, self.page, self.rig, self.takes = server, page, rig, takes
+    def __init__(self, server: LiveServer, page: Page, rig: Path, takes: Path, bodies: dict[str, np.ndarray]) -> None:
+        """`bodies` are the poses that are sent; a test may change them."""
+        self.server, self.page, self.rig, self.takes, self.bodies = server, page, rig, takes, bodies
         self.subscriber = Subscriber(server.addresses["hands"])
 
     def until(self, fulfilled: Callable[[HandsMessage], Any]) -> HandsMessage:
@@ -81,6 +85,24 @@ class Studio:
             assert time.monotonic() < give_up_s, answer
         return answer["bodies"]["actor"]["Box"]
 
+    def kept_place(self) -> list[float]:
+        """Where the rig file says that the object sits on the body Box."""
+        return tomllib.loads(self.rig.read_text())["objects"][0].get("position", [0.0, 0.0, 0.0])
+
+    def red_arrow(self) -> tuple[float, float]:
+        """Where on the page the arrow along x is that moves an object."""
+        self.page.evaluate(DISMISS)
+        left, top, width, height = self.page.wait_for(PLACE)
+        give_up_s = time.monotonic() + PATIENCE_S
+        while True:
+            stage = self.page.picture()[int(top) : int(top + height), int(left) : int(left + width)]
+            red, green, blue = stage.transpose(2, 0, 1)
+            rows, columns = np.nonzero((red > green + 60) & (red > blue + 40))
+            if len(columns) > 200 and columns.max() > width / 2:
+                tip = columns.argmax()
+                return left + columns[tip] - 8.0, float(top + rows[tip])
+            assert time.monotonic() < give_up_s, "no arrow is drawn"
+
     def disabled(self, button: str) -> bool:
         """Whether a button cannot be clicked."""
         return bool(self.page.evaluate(DISABLED % button))
@@ -90,21 +112,26 @@ class Studio:
         self.page.wait_for(f"{TEXT}.includes({text!r})", PATIENCE_S)
 
 
+def clusters_of(wrists: dict[Side, np.ndarray]) -> dict[str, np.ndarray]:
+    """The bodies on which these wrists sit."""
+    return {f"{side}_wrist": compose(wrist, invert(T_CLUSTER_WRIST)) for side, wrist in wrists.items()}
+
+
 @contextlib.contextmanager
-def lying_still(server: LiveServer) -> Iterator[None]:
-    """Hands on the sheet and a box beside them, 120 times a second."""
+def lying_still(server: LiveServer) -> Iterator[dict[str, np.ndarray]]:
+    """Hands on the sheet and a box beside them, 120 times a second; yields their poses, which may be changed."""
     sender, ended = Sender(server.addresses["bodies"]), threading.Event()
-    clusters = {f"{side}_wrist": compose(wrist, invert(T_CLUSTER_WRIST)) for side, wrist in WRISTS.items()}
+    bodies = {**clusters_of(WRISTS), "Box": BOX}
 
     def send() -> None:
         frames = 0
         while not ended.wait(1.0 / 120.0):
-            sender.send(frames / 120.0, {**clusters, "Box": BOX})  # type: ignore[arg-type]
+            sender.send(frames / 120.0, dict(bodies))
             frames += 1
 
     thread = threading.Thread(target=send)
     thread.start()
-    yield
+    yield bodies
     ended.set()
     thread.join()
     sender.close()
@@ -120,14 +147,14 @@ def studio_in(folder: Path, model: Path) -> Iterator[Studio]:
     options = ("--rig", str(rig), "--model", str(model), "--takes", str(takes))
     with (
         serving(*options) as server,
-        lying_still(server),
+        lying_still(server) as bodies,
         browsing(chromium, server.addresses["page"], folder / "profile") as page,
     ):
         page.call("Emulation.setDeviceMetricsOverride", width=1000, height=700, deviceScaleFactor=1, mobile=False)
         page.call("Page.enable")
         page.call("Page.addScriptToEvaluateOnNewDocument", source=COMPLAIN)
         page.call("Page.reload")
-        studio = Studio(server, page, rig, takes)
+        studio = Studio(server, page, rig, takes, bodies)
         studio.says("hands/s")
         yield studio
         assert page.evaluate("window.complaints.join('; ') || 'none'") == "none"

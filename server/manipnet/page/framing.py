@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -98,6 +98,21 @@ class FollowCamera:
     def restart(self) -> None:
         """Frame what happens with the next call of `follow`, and follow it from then on."""
         self.following, self._echoed, self._back, self._moved_s = True, False, None, None
+
+    def state(self) -> dict[str, list[float]] | None:
+        """Where the camera is and looks; None while it follows."""
+        if self.following:
+            return None
+        camera = self._client.camera
+        return {"position": np.array(camera.position).tolist(), "look_at": np.array(camera.look_at).tolist()}
+
+    def stand(self, position: Sequence[float], look_at: Sequence[float]) -> None:
+        """Stay at a place, as if the visitor had moved the camera there."""
+        self.following = False
+        camera = self._client.camera
+        with self._client.atomic():
+            camera.up_direction = (0.0, 1.0, 0.0)
+            camera.position, camera.look_at = np.array(position, dtype=float), np.array(look_at, dtype=float)
 
     def follow(self, focus: Focus | None) -> None:
         """Move a little towards what happens; called for every frame that is shown."""

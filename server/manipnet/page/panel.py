@@ -17,6 +17,7 @@ from manipnet.page.hand_choices import HandChoices
 from manipnet.page.hands_tab import HandsTab
 from manipnet.page.markdown import escape
 from manipnet.page.objects_tab import ObjectsTab
+from manipnet.page.presets import Presets
 from manipnet.page.refusals import refusals_text
 from manipnet.page.rpc import RefusedError
 from manipnet.page.show import Show
@@ -55,6 +56,7 @@ class Panel:
         tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
             self._view_tab = ViewTab(ask, show, client, self._camera, self.perform, operator)
+            Presets(ask, client, self._view_tab, self.perform, operator)
         if operator:
             with tabs.add_tab("Objects"):
                 self.objects = ObjectsTab(ask, client, self.perform)

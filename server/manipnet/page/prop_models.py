@@ -7,6 +7,7 @@ import numpy as np
 import viser
 
 from manipnet.geometry import Array, transform
+from manipnet.page.creases import split_at_creases
 from manipnet.page.frames import PropView, ShapeView
 from manipnet.page.hand_models import GHOST, wxyz
 
@@ -38,10 +39,11 @@ class PropModels:
             if (last.content_hash, last.scale) == (prop.content_hash, prop.scale):
                 return model
             model.remove()
+        vertices, faces = split_at_creases(shape.vertices, shape.faces)
         model = self._scene.add_mesh_simple(
             f"{self._name}/{prop.name}",
-            prop.scale * shape.vertices,
-            shape.faces,
+            prop.scale * vertices,
+            faces,
             color=GHOST if self._ghost else color,
             opacity=0.18 if self._ghost else None,
             cast_shadow=not self._ghost,

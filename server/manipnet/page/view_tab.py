@@ -1,19 +1,17 @@
 """The tab about what a visitor sees: camera, look-ahead, theme and layers. All but the look-ahead is his own."""
 
-import contextlib
 import threading
-from typing import Final
+from typing import Any, Final
 
 import viser
 
-from manipnet.page.controls import Ask, Perform, by_visitor
+from manipnet.page.controls import Ask, Perform, by_visitor, remembered
 from manipnet.page.framing import FollowCamera
 from manipnet.page.html import legend
 from manipnet.page.overlays import LAYERS, OVERLAYS
 from manipnet.page.show import Show
 
 THEME: Final = "theme"
-ANSWER_S: Final = 20.0
 ACCENT: Final = (56, 132, 222)
 
 
@@ -29,6 +27,9 @@ class ViewTab:
         """The visitor's own node above each layer. It is hidden and never removed: the browser would remove what
         others have drawn below it."""
         self._layers = frozenset[str]()
+        self._boxes: dict[str, viser.GuiCheckboxHandle] = {}
+        self.look_ahead_s = 0.0
+        """The look-ahead that is in force."""
         gui = client.gui
         if operator:
             slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
@@ -46,7 +47,7 @@ class ViewTab:
         gui.add_markdown("**Layers**")
         for name, layer in OVERLAYS.items():
             self._nodes[name] = client.scene.add_frame(f"{LAYERS}/{name}", show_axes=False, visible=False)
-            box = gui.add_checkbox(layer.label, False)
+            box = self._boxes[name] = gui.add_checkbox(layer.label, False)
             gui.add_html(legend(layer))
             box.on_update(lambda event, name=name: self._set_layer(name, event.target.value))
         self._apply_theme()
@@ -54,6 +55,7 @@ class ViewTab:
 
     def refresh(self, look_ahead_s: float) -> None:
         """Show whether the camera follows, and the look-ahead that is in force."""
+        self.look_ahead_s = look_ahead_s
         self._follow.disabled = self._camera.following
         slider = getattr(self, "_look_ahead", None)
         if slider is not None and abs(slider.value - 1e3 * look_ahead_s) > 0.5:
@@ -64,6 +66,22 @@ class ViewTab:
         self._show.settle()
         self._camera.restart()
         self._follow.disabled = True
+
+    def state(self) -> dict[str, Any]:
+        """Theme, layers and camera, for a preset; a camera that follows is None."""
+        return {"dark": self._dark, "layers": sorted(self._layers), "camera": self._camera.state()}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Return to what `state` returned; what is missing stays as it is."""
+        if state.get("dark", self._dark) != self._dark:
+            self._switch_theme()
+        if "layers" in state:
+            for name, box in self._boxes.items():
+                box.value = name in state["layers"]
+        if state.get("camera"):
+            self._camera.stand(state["camera"]["position"], state["camera"]["look_at"])
+        elif "camera" in state:
+            self.follow()
 
     def close(self) -> None:
         """Forget the layers: the visitor has left."""
@@ -81,10 +99,9 @@ class ViewTab:
 
     def _remember_theme(self) -> None:
         """Use the theme that this browser used before; runs on a thread of its own, because it waits for the answer."""
-        with contextlib.suppress(RuntimeError, TimeoutError):  # he has left, or his browser stores nothing
-            if self._client.local_storage.get_item(THEME, ANSWER_S) == "light":
-                self._dark = False
-                self._apply_theme()
+        if remembered(self._client, THEME) == "light":
+            self._dark = False
+            self._apply_theme()
 
     def _apply_theme(self) -> None:
         self._client.gui.configure_theme(

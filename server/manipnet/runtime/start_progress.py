@@ -15,10 +15,10 @@ TEXT: Final = "first start: code is compiled once, which takes some seconds"
 
 
 class StartProgress:
-    """Reports once a second with `show`, and every few seconds with `log`, that a start compiles; until `end`."""
+    """Reports that a start compiles, until `end`: a terminal once a second in place, a log every few seconds."""
 
     def __init__(self, show: Callable[[str], None], log: Callable[[str], None], is_terminal: bool) -> None:
-        """A terminal shows the progress in place, so `log` gets only one line there."""
+        """On a terminal, only `show` is called, elsewhere only `log`, so that nobody reads the same twice."""
         self._show, self._log, self._is_terminal = show, log, is_terminal
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name="start-progress", daemon=True)
@@ -34,7 +34,7 @@ class StartProgress:
     def begin(self) -> None:
         """Begin to report, unless it has begun."""
         if self._thread.ident is None:
-            self._log(TEXT)
+            (self._show if self._is_terminal else self._log)(TEXT)
             self._thread.start()
 
     def end(self) -> None:
@@ -45,8 +45,9 @@ class StartProgress:
         begin_s, logged_s = time.monotonic(), 0.0
         while not self._ended.wait(STEP_S):
             passed_s = time.monotonic() - begin_s
-            self._show(f"{TEXT}: {passed_s:.0f} s so far")
-            if not self._is_terminal and passed_s - logged_s >= LOG_S:
+            if self._is_terminal:
+                self._show(f"{TEXT}: {passed_s:.0f} s so far")
+            elif passed_s - logged_s >= LOG_S:
                 logged_s = passed_s
                 self._log(f"still compiling after {passed_s:.0f} s")
 
