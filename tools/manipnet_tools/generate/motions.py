@@ -200,7 +200,7 @@ def _fingers(time_s: Array, holds: Sequence[Hold], limits: Array, rng: Generator
     quiet = np.zeros(len(time_s))
     for hold in holds:
         reach, leave = hold.contact_s - hold.reach_s, hold.away_s - hold.release_s
-        wide = rng.uniform(0.7, 1.0)
+        wide = rng.uniform(0.7, 1.25)
         for f in range(5):
             own = slice(4 * f, 4 * f + 4)
             lag = rng.normal(0.0, 0.02)

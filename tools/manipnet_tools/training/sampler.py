@@ -23,6 +23,15 @@ LEAST_STARTS = 8
 
 
 @dataclass(frozen=True, eq=False)
+class Posed:
+    """A hand with its mean pose, by which hands that rest differently are compared."""
+
+    hand: Hand
+    angles: Array
+    """`(A,)`"""
+
+
+@dataclass(frozen=True, eq=False)
 class _Part:
     """One set of takes, prepared for sampling. Its poses are blended among themselves only, because the angles of two
     kinds of hands need not mean the same pose."""
@@ -40,31 +49,30 @@ class _Part:
 class RoundSampler:
     """Makes the samples of each round, and determines the limits and the rest pose of the captured hands."""
 
-    def __init__(
-        self, sets: Sequence[TakeSet], config: TrainConfig, share: float, frames_of: Hand | None = None
-    ) -> None:
+    def __init__(self, sets: Sequence[TakeSet], config: TrainConfig, share: float, model: Posed | None = None) -> None:
         """Use the first `share` of every take.
 
-        The network knows one layout of the bones' frames: that of `frames_of`, or else that of the model's hand.
+        The network knows one layout of the bones' frames: that of `model`, or else that of the first set's main hand.
         """
         self._config = config
-        own = main_hand(sets[0])
-        self.hand = own if frames_of is None else in_frames_of(own, frames_of)
-        """The hand that the network poses: the one that most takes of the first set have."""
         self._rng = np.random.default_rng(config.seed)
+        pools = [_pool(each.hands, share) for each in sets]
+        rests = [pool.mean(axis=0) for pool in pools]
+        own = main_hand(sets[0])
+        model = Posed(own, rests[0]) if model is None else model
+        self.hand = in_frames_of(own, model.hand, rests[0], model.angles)
+        """The hand that the network poses: the one that most takes of the first set have."""
         self._parts = [
-            self._prepared(_in_frames(each.hands, self.hand), share, thinned)
-            for each, thinned in zip(sets, _thinned(sets, config, share), strict=True)
+            self._prepared(_in_frames(each.hands, rest, model), share, pool, thinned)
+            for each, rest, pool, thinned in zip(sets, rests, pools, _thinned(sets, config, share), strict=True)
         ]
-        first = self._parts[0]
-        self.limits = first.limits
+        self.limits = self._parts[0].limits
         """`(A, 2)` radians."""
-        self.rest_angles = np.clip(first.pool.mean(axis=0), self.limits[:, 0], self.limits[:, 1])
+        self.rest_angles = np.clip(rests[0], self.limits[:, 0], self.limits[:, 1])
         """`(A,)` radians."""
 
-    def _prepared(self, hands: list[CapturedHand], share: float, thinned: float) -> _Part:
+    def _prepared(self, hands: list[CapturedHand], share: float, pool: Array, thinned: float) -> _Part:
         spans = spans_of(hands, share)
-        pool = np.concatenate([c.angles[low:high:4] for c, (low, high) in zip(hands, spans, strict=True)])
         if self._config.time_reversed:
             backward = [(len(c) - high, len(c) - low) for c, (low, high) in zip(hands, spans, strict=True)]
             hands, spans = hands + [captured.backwards() for captured in hands], spans + backward
@@ -109,12 +117,17 @@ def main_hand(takes: TakeSet) -> Hand:
     return next(captured.hand for captured in takes.hands if captured.hand.name == name)
 
 
-def _in_frames(hands: Sequence[CapturedHand], model: Hand) -> list[CapturedHand]:
-    """The same takes, with the bones' frames of the model's hand."""
+def _pool(hands: Sequence[CapturedHand], share: float) -> Array:
+    """Captured poses `(N, A)` of takes."""
+    return np.concatenate([c.angles[low:high:4] for c, (low, high) in zip(hands, spans_of(hands, share), strict=True)])
+
+
+def _in_frames(hands: Sequence[CapturedHand], rest: Array, model: Posed) -> list[CapturedHand]:
+    """The same takes with the bones' frames that the model knows; `rest (A,)` is the takes' mean pose."""
     turned: dict[bytes, Hand] = {}
     for captured in hands:
         if (key := captured.hand.packed.tobytes()) not in turned:
-            turned[key] = in_frames_of(captured.hand, model)
+            turned[key] = in_frames_of(captured.hand, model.hand, rest, model.angles)
     return [replace(captured, hand=turned[captured.hand.packed.tobytes()]) for captured in hands]
 
 
