@@ -11,7 +11,7 @@ from manipnet_tools.generate.finger_tables import Tables
 from manipnet_tools.generate.grasps import Grasp
 
 AWAY_M: Final = 0.07
-_WIDER: Final = np.array([-0.45, 0.25, -0.2, -0.3, *4 * (-0.55, 0.0, -0.6, -0.4)])
+_WIDER: Final = np.array([-0.35, 0.1, -0.15, -0.2, *4 * (-0.4, 0.0, -0.45, -0.3)])
 _STRAIGHT: Final = np.array([-0.15, 0.1, 0.05, 0.05, *4 * (0.1, 0.0, 0.15, 0.1)])
 
 
