@@ -20,7 +20,8 @@ def test_a_model_of_another_hand_poses_the_captured_one():
     posed = posing(bundle, free)
     check_hand(posed.hand)
     angles = np.random.default_rng(0).uniform(*free.limits.T, (20, free.angle_count))
-    np.testing.assert_allclose(forward_kinematics(posed.hand, angles)[0], forward_kinematics(free, angles)[0], atol=1e-9)
+    joints = [forward_kinematics(hand, angles)[0] for hand in (posed.hand, free)]
+    np.testing.assert_allclose(*joints, atol=1e-9)
     at_rest = [forward_kinematics(hand, bundle.rest_angles)[1] for hand in (posed.hand, bundle.hand)]
     np.testing.assert_allclose(*at_rest, atol=1e-9)
     assert ((posed.limits[:, 0] <= posed.rest_angles) & (posed.rest_angles <= posed.limits[:, 1])).all()
