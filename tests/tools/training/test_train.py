@@ -10,6 +10,7 @@ import trimesh
 
 torch = pytest.importorskip("torch", reason="training needs the train extra")
 
+from manipnet.common.options import ConfigError
 from manipnet.geometry import quat_exp
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import load_bundle
@@ -21,6 +22,7 @@ from manipnet_tools.evaluation import ablate
 from manipnet_tools.evaluation.options import ABLATION_TRAINING, AblateOptions
 from manipnet_tools.generate.free_hand import free_hand
 from manipnet_tools.generate.proportions import Proportions, proportioned
+from manipnet_tools.takes.dataset import DataError
 from manipnet_tools.training import quantise
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, TakeSet
@@ -175,8 +177,8 @@ def test_a_quantised_bundle_is_not_gone_on_from(hands, tmp_path):
 
 def test_the_bundle_is_written_after_each_round(hands):
     seen = []
-    train(hands, TINY, after_round=lambda now: seen.append(now.seconds))
-    assert len(seen) == TINY.rounds
+    train(hands, TINY, after_round=lambda now, text: seen.append(text))
+    assert [text.partition("  ")[0] for text in seen] == ["round 1/2", "round 2/2"]
 
 
 def test_sets_give_samples_by_weight_and_a_round_is_no_larger_than_it_may_be(hands):
@@ -198,8 +200,8 @@ def test_hands_of_other_proportions_and_frames_are_learned_together(hands):
     used = sampler._parts[1].hands[0].hand
     angles = np.random.default_rng(0).uniform(*other.limits.T, (20, other.angle_count))
     np.testing.assert_allclose(forward_kinematics(used, angles)[0], forward_kinematics(other, angles)[0], atol=1e-9)
-    flat = [forward_kinematics(hand, np.zeros(hand.angle_count))[1] for hand in (used, HAND)]
-    np.testing.assert_allclose(*flat, atol=1e-9)
+    rest = np.concatenate([captured.angles[FUTURE_FRAMES:-FUTURE_FRAMES:4] for captured in hands[0].hands]).mean(axis=0)
+    np.testing.assert_allclose(*(forward_kinematics(hand, rest)[1] for hand in (used, HAND)), atol=1e-9)
     samples = sampler.next_round(model.model)
     assert np.isfinite(samples.inputs).all()
     assert np.isfinite(samples.outputs).all()
@@ -209,3 +211,28 @@ def test_the_model_poses_the_hand_that_most_takes_of_the_first_set_have(hands):
     other = proportioned(free_hand(), Proportions(1.1), "another")
     first, second = hands[0].hands
     assert main_hand(TakeSet([replace(first, hand=other), second, first])) is HAND
+
+
+def test_short_takes_are_left_out_and_need_no_roll_outs(hands):
+    """A take of 1.2 s, as `manipnet import` may leave one, has samples but is too short for roll-outs."""
+    whole, config = hands[0].hands[0], replace(TINY, roll_out_ticks=40)
+    arrays = ("wrist", "other_wrist", "object", "angles")
+    cut = {n: replace(whole, **{name: getattr(whole, name)[:n] for name in arrays}) for n in (100, 150)}
+    model = train(hands, replace(TINY, rounds=1)).model
+    assert len(RoundSampler([TakeSet([cut[150], cut[100]])], config, 1.0).next_round(model)) == 9 + 18
+    with pytest.raises(DataError, match=r"no take is long enough to train on; one must have at least 1\.01 s"):
+        RoundSampler([TakeSet([cut[100]])], config, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"rounds": 0}, "--training.rounds is 0; it must be at least 1"),
+        ({"round_samples": 31, "batch": 32}, "--training.round-samples is 31; it must be at least 32"),
+        ({"captured": 0.0, "blended": 0.0}, "one of the first two must be above 0"),
+        ({"on_policy": -0.1}, "must not be negative"),
+    ],
+)
+def test_numbers_with_which_nothing_can_be_trained_are_named(change, reason):
+    with pytest.raises(ConfigError, match=reason):
+        replace(TrainConfig(), **change).check()

@@ -111,10 +111,14 @@ VERBS = {
         ),
     ),
     "train": Verb(
-        "train a model on captured takes",
+        "train a model on captured or generated takes",
         "manipnet_tools.training.train",
         "manipnet_tools.training.options.TrainOptions",
-        ("--data DATASET --out models/mine",),
+        (
+            "--data DATASET --out models/mine                 one folder of takes",
+            "--data DATASET generated=0.5 --out models/mixed  two folders, one sample in three from the second",
+            "--data DATASET --start models/open --out tuned   go on from a bundle",
+        ),
     ),
     "ablate": Verb(
         "train and evaluate the rows of the paper's Table 1",

@@ -4,9 +4,13 @@ from collections.abc import Callable, Collection, Container, Sequence
 from dataclasses import replace
 from itertools import groupby
 
+import numpy as np
 from rich.progress import Progress
 
-from manipnet.synthesis.model.bundle import Bundle
+from manipnet.geometry import Array
+from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines
 from manipnet_tools.evaluation.baselines import held
@@ -101,6 +105,25 @@ def baseline_rows(model: Callable[[Fold], Bundle]) -> dict[str, Source]:
     return {NEAREST: nearest, HOLD: hold}
 
 
+def posing(bundle: Bundle, hand: Hand) -> Bundle:
+    """The bundle with the hand that it shall pose in place of its own, if that is another one.
+
+    Hands are compared in their relaxed poses. That of the dataset's subject is known from the shipped bundle; a
+    generated hand has the angles of its model.
+    """
+    if np.allclose(_flat(hand), _flat(bundle.hand), atol=1e-6):
+        return bundle
+    own, subject = bundle.rest_angles, load_bundle()
+    rest = subject.rest_angles if np.allclose(_flat(hand), _flat(subject.hand), atol=1e-6) else own
+    shifted = bundle.limits + (rest - own)[:, None]
+    return replace(bundle, hand=in_frames_of(hand, bundle.hand, rest, own), rest_angles=rest, limits=shifted)
+
+
+def _flat(hand: Hand) -> Array:
+    """Joints `(J, 3)` of the hand when all angles are zero."""
+    return forward_kinematics(hand, np.zeros(hand.angle_count))[0]
+
+
 def synthesise(
     bundle: Bundle, solver: str, cases: Sequence[Case], advance: Callable[[int], None] = lambda n: None
 ) -> list[Hands]:
@@ -113,7 +136,7 @@ def synthesise(
     for _, same in groupby(cases, lambda case: case.hand.packed.tobytes()):
         of_hand = list(same)
         inputs = [case.inputs for case in of_hand]
-        posed = replace(bundle, hand=in_frames_of(of_hand[0].hand, bundle.hand))
-        motions = iter(roll_out(Synthesizer(posed, solver), [seen for of in inputs for seen in of.values()], advance))
+        synthesizer = Synthesizer(posing(bundle, of_hand[0].hand), solver)
+        motions = iter(roll_out(synthesizer, [seen for of in inputs for seen in of.values()], advance))
         results += [{side: next(motions).positions for side in of} for of in inputs]
     return results

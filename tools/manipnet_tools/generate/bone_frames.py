@@ -13,13 +13,17 @@ from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 
 
-def in_frames_of(hand: Hand, other: Hand) -> Hand:
-    """The hand with the frames that the bones of another hand of the same layout have when all angles are zero.
+def in_frames_of(hand: Hand, other: Hand, angles: Array | None = None, other_angles: Array | None = None) -> Hand:
+    """The hand with the frames that the bones of another hand of the same layout have.
 
-    Joints, hinges, skin and sensors stay where they are, and so do the angles of every pose. It is the same object if
-    it has these frames already.
+    Frames are alike when this hand has the pose `angles (A,)` and the other one `other_angles (A,)`, by default zero.
+    Hands that rest differently, for example with leaning fingers, are compared in their relaxed poses. Joints, hinges,
+    skin and sensors stay where they are, and so do the angles of every pose. It is the same object if it has these
+    frames already.
     """
-    own, others = (forward_kinematics(each, np.zeros(each.angle_count))[1] for each in (hand, other))
+    zero = np.zeros(hand.angle_count)
+    own = forward_kinematics(hand, zero if angles is None else angles)[1]
+    others = forward_kinematics(other, zero if other_angles is None else other_angles)[1]
     if np.allclose(own, others, rtol=0.0, atol=1e-9):
         return hand
     turns = np.swapaxes(own, 1, 2) @ others  # from each bone's new frame to its old one

@@ -33,7 +33,7 @@ from manipnet_tools.generate.finger_tables import RELAXED
 
 RATE_HZ: Final = 120.0
 _DRIFT_M, _DRIFT_RAD = 0.0008, 0.006
-_FREE_LIFE_RAD, _HELD_LIFE_RAD = np.radians(9.0), np.radians(3.0)
+_FREE_LIFE_RAD, _HELD_LIFE_RAD = np.radians(3.0), np.radians(3.0)
 _CLEAR_M: Final = 0.12
 """A hand that does not hold keeps its palm this far from the object."""
 _GIVES_WAY_M: Final = np.array([0.0, 0.05, 0.04])
@@ -174,7 +174,7 @@ def _at_home(time_s: Array, side: Side, rng: Generator) -> Array:
     while start < time_s[-1]:
         length = rng.uniform(0.7, 1.8)
         moves.append(Move(start, start + length, _home(rng)))
-        start += length * rng.uniform(0.7, 2.2)
+        start += length * rng.uniform(1.0, 4.0)
     pose = superpose(time_s, at, moves)
     pose[:, :3] += _life(time_s, 3, 0.004, rng, _LIFE_HZ[:3])
     return mirror_poses(pose) if side == "left" else pose
@@ -193,14 +193,14 @@ def _fingers(time_s: Array, holds: Sequence[Hold], limits: Array, rng: Generator
     count = len(limits)
     angles, moves_s = np.tile(_idle(limits, rng), (len(time_s), 1)), 0.0
     last = angles[0].copy()
-    while (moves_s := moves_s + rng.uniform(0.6, 2.0)) < time_s[-1]:
+    while (moves_s := moves_s + rng.uniform(1.5, 5.0)) < time_s[-1]:
         wanted = _idle(limits, rng)
-        angles += ease(time_s, moves_s, moves_s + rng.uniform(0.4, 1.0))[:, None] * (wanted - last)
+        angles += ease(time_s, moves_s, moves_s + rng.uniform(0.6, 1.5))[:, None] * (wanted - last)
         last = wanted
     quiet = np.zeros(len(time_s))
     for hold in holds:
         reach, leave = hold.contact_s - hold.reach_s, hold.away_s - hold.release_s
-        wide = rng.uniform(0.7, 1.0)
+        wide = rng.uniform(0.4, 1.0)
         for f in range(5):
             own = slice(4 * f, 4 * f + 4)
             lag = rng.normal(0.0, 0.02)

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from manipnet.geometry import Array
+from manipnet.geometry import Array, quat_exp, quat_multiply, quat_rotate
 from manipnet.synthesis.hand.hand import Hand, Indices
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 
@@ -14,19 +14,23 @@ HANDS: Final = 24
 _SIZES, _FINGERS, _THICKNESSES = (0.85, 1.2), (0.9, 1.1), (0.9, 1.2)
 _WRIST_M: Final = 0.012
 """Rigs and trackers put the wrist this far from where anatomy has it."""
+_LEANS: Final = (-0.25, 0.05)
+"""Radians; fingers at rest lean away from the thumb, some people's more than others'."""
 
 
 @dataclass(frozen=True)
 class Proportions:
     """Relative to the free hand: the size of everything, the length of the fingers, and the thickness.
 
-    `palm_m` is how far the palm with all that belongs to it is moved in the wrist frame, along x and z.
+    `palm_m` is how far the palm with all that belongs to it is moved in the wrist frame, along x and z; `lean` is how
+    far the four fingers are turned toward the thumb when their angles are zero, radians.
     """
 
     size: float = 1.0
     fingers: float = 1.0
     thickness: float = 1.0
     palm_m: tuple[float, float] = (0.0, 0.0)
+    lean: float = 0.0
 
 
 def drawn_proportions(number: int, seed: int) -> Proportions:
@@ -36,7 +40,7 @@ def drawn_proportions(number: int, seed: int) -> Proportions:
     rng = np.random.default_rng([seed, 7, number])
     size, fingers, thickness = (round(float(rng.uniform(*limits)), 3) for limits in (_SIZES, _FINGERS, _THICKNESSES))
     along, up = (round(float(rng.uniform(-_WRIST_M, _WRIST_M)), 4) for _ in range(2))
-    return Proportions(size, fingers, thickness, (0.5 * along, up))
+    return Proportions(size, fingers, thickness, (0.5 * along, up), round(float(rng.uniform(*_LEANS)), 3))
 
 
 def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
@@ -51,9 +55,13 @@ def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
     offsets = proportions.size * long[:, None] * hand.offsets
     offsets[1:][hand.parents[1:] == 0] += shift
     radii = proportions.size * proportions.thickness * hand.radii
-    changed = replace(hand, name=name, offsets=offsets, radii=radii)
+    rest, turn = hand.rest_quats.copy(), quat_exp(np.array([0.0, 0.0, proportions.lean]))
+    knuckles = [finger[-4] for finger in hand.fingers[1:]]
+    rest[knuckles] = quat_multiply(turn, rest[knuckles])
+    axes = np.where(np.isin(hand.angle_bones, knuckles)[:, None], quat_rotate(turn, hand.axes), hand.axes)
+    changed = replace(hand, name=name, offsets=offsets, radii=radii, rest_quats=rest, axes=axes)
     before, turns = forward_kinematics(hand, hand.skin.bind_angles)
-    after, _ = forward_kinematics(changed, hand.skin.bind_angles)
+    after, new_turns = forward_kinematics(changed, hand.skin.bind_angles)
     child = np.zeros(hand.bone_count, dtype=int)
     for finger in hand.fingers:
         child[list(finger[:-1])] = finger[1:]
@@ -73,7 +81,7 @@ def proportioned(hand: Hand, proportions: Proportions, name: str) -> Hand:
 
     skin, sensors = hand.skin, hand.sensors
     local = np.einsum("vkji,vkj->vki", turns[skin.bones], skin.vertices[:, None] - before[skin.bones])
-    placed = after[skin.bones] + np.einsum("vkij,vkj->vki", turns[skin.bones], grown(local, skin.bones))
+    placed = after[skin.bones] + np.einsum("vkij,vkj->vki", new_turns[skin.bones], grown(local, skin.bones))
     vertices = np.sum(skin.weights[..., None] * placed, axis=1)
     center = offsets[8] + (sensors.grid_center - hand.offsets[8])
     return replace(

@@ -25,6 +25,8 @@ WIDEST_PINCH_M: Final = 0.085
 FACING: Final = 0.75
 """Cosine between a pad and the line to the other one."""
 CONE_RAD: Final = np.radians(30.0)
+_SPARED: Final = (0.45, 0.2, 0.35)
+"""How often no finger, the little finger, or the last two stay away: people hold small bodies with fewer."""
 _POWER, _PRECISE, _HOOK, _FLAT = (0.6, 1.0, 1.2), (0.0, 0.15, 2.0), (0.8, 1.2, 1.0), (0.5, 0.5, 0.6)
 
 
@@ -203,6 +205,8 @@ def _on_surface(tables: Tables, corners: Array, kind: str, rng: Generator) -> Pr
     row = {"above": _PRECISE, "palm": _POWER, "flat": _FLAT}[kind]
     wanted = np.array([row] * 5) * (1.0 if kind != "flat" else np.array([0.3, 1, 1, 1, 1])[:, None])
     flat = kind == "flat"
+    if not flat:
+        wanted[5 - int(rng.choice(3, p=_SPARED)) :] = 0.0
     downs = cone(turn[:, 2]) if flat else SIDES
     return Proposal(kind, turn, point - turn @ at, wanted, () if flat else (0, 1, 2), -z, downs)
 

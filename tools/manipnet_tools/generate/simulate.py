@@ -11,7 +11,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from manipnet.geometry import Array, matrix_to_quat
+from manipnet.geometry import Array, matrix_to_quat, quat_conjugate, quat_rotate
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet_tools.generate.contact import PALM_START, Space, look
@@ -98,7 +98,21 @@ class Shaker:
         return float(np.linalg.norm(centre[1] - centre[0])), turned
 
 
+def hand_model(hand: Hand) -> mujoco.MjModel:
+    """The hand alone, for a look at its kinematics."""
+    spec = _spec()
+    _add_hand(spec, hand)
+    return spec.compile()
+
+
 def _model(hand: Hand, shape: Surface, pieces: Sequence[Array]) -> mujoco.MjModel:
+    spec = _spec()
+    _add_hand(spec, hand)
+    _add_object(spec, shape, pieces)
+    return spec.compile()
+
+
+def _spec() -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.compiler.autolimits = True
     spec.compiler.degree = False
@@ -108,9 +122,7 @@ def _model(hand: Hand, shape: Surface, pieces: Sequence[Array]) -> mujoco.MjMode
     spec.option.noslip_iterations = 2
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_MULTICCD
-    _add_hand(spec, hand)
-    _add_object(spec, shape, pieces)
-    return spec.compile()
+    return spec
 
 
 def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
@@ -119,6 +131,7 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
         bodies[bone] = bodies[int(hand.parents[bone])].add_body(
             name=hand.joint_names[bone],
             pos=hand.offsets[bone],
+            quat=hand.rest_quats[bone, [3, 0, 1, 2]],
             gravcomp=1.0,
             mass=0.01,
             inertia=[1e-6] * 3,
@@ -128,7 +141,7 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
             joint = bodies[bone].add_joint(
                 name=hand.angle_names[a],
                 type=mujoco.mjtJoint.mjJNT_HINGE,
-                axis=hand.axes[a],
+                axis=quat_rotate(quat_conjugate(hand.rest_quats[bone]), hand.axes[a]),
                 range=hand.limits[a] + [-0.3, 0.3],
             )
             joint.armature = 1e-4

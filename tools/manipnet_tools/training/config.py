@@ -1,9 +1,12 @@
 """The recipe of a model: its architecture, its samples and its optimiser."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
+
+from manipnet.common.options import ConfigError
 
 Architecture = Literal["manipnet", "resnet", "mlp"]
+_LEAST: Final = {"width": 3, "rounds": 1, "epochs_per_round": 1, "batch": 1, "roll_out_ticks": 1}
 
 
 @dataclass(frozen=True)
@@ -54,3 +57,14 @@ class TrainConfig:
     """Learn every take played backwards as well."""
     seed: int = 0
     """Seed of every random number."""
+
+    def check(self) -> None:
+        """Raise `ConfigError` for a number with which nothing can be trained."""
+        for name, least in (_LEAST | {"round_samples": self.batch}).items():
+            if (value := getattr(self, name)) < least:
+                raise ConfigError(f"--training.{name.replace('_', '-')} is {value}; it must be at least {least}")
+        if self.captured + self.blended <= 0.0 or min(self.captured, self.blended, self.on_policy) < 0.0:
+            raise ConfigError(
+                "--training.captured, --training.blended and --training.on-policy must not be negative, and one of the "
+                "first two must be above 0"
+            )

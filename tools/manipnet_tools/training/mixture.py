@@ -53,8 +53,8 @@ def require_free(licence: str) -> None:
     """Raise `DataError` if these terms forbid commercial use or do not say that they allow it."""
     if foreign := foreign_terms(licence):
         raise DataError(
-            f"--free: the model could not be used commercially, because of: {' | '.join(foreign)}. Leave out these"
-            " takes, start from another bundle, or train without --free"
+            f"--free: the model could not be used commercially, because of: {' | '.join(foreign)}. Leave out these "
+            f"takes, start from another bundle, or train without --free"
         )
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
+from manipnet.common.options import ConfigError
 from manipnet.synthesis.model.shipped import find_bundle, licence_of
 from manipnet_tools.commands.arguments import Positional, arg
 from manipnet_tools.commands.checks import require_new_bundle
@@ -34,8 +35,11 @@ class TrainOptions(WritingOptions):
 
     def check(self) -> None:
         """Raise `DataError` for takes that cannot be used, `BundleError` for an unknown `--start`, and `ConfigError`
-        for a bundle that exists already."""
+        for a number out of range or a bundle that exists already."""
         require_new_bundle(self.out, self.force)
+        if not 0.0 < self.share <= 1.0:
+            raise ConfigError(f"--share is {self.share:g}; it must be above 0 and at most 1")
+        self.training.check()
         licence = self.licence()
         if self.free:
             require_free(licence)

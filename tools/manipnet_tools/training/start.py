@@ -7,12 +7,12 @@ import onnx
 import torch
 from onnx import numpy_helper
 
-from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.bundle import NETWORK_FILE, Bundle, load_bundle
 from manipnet.synthesis.model.shipped import BundleError, licence_of
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.model import ManipNet, Normalisation
 from manipnet_tools.training.quantise import single_precision
+from manipnet_tools.training.sampler import Posed
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,10 +20,12 @@ class Start:
     """A trained network to go on from."""
 
     network: ManipNet
-    hand: Hand
+    posed: Posed
     """The hand whose bone frames the network knows."""
     licence: str
     """Its terms, which are also those of what is made of it."""
+    bundle_hash: str
+    """SHA-256 of the bundle."""
 
 
 def read_start(model: str, config: TrainConfig) -> tuple[Start, TrainConfig]:
@@ -45,7 +47,8 @@ def read_start(model: str, config: TrainConfig) -> tuple[Start, TrainConfig]:
         network = _network(bundle, weights, config)
     except (KeyError, RuntimeError, TypeError, ValueError) as error:
         raise BundleError(f"{bundle.folder}: is not a bundle of manipnet train ({error})") from None
-    return Start(network, bundle.hand, licence_of(bundle.folder)), config
+    posed = Posed(bundle.hand, bundle.rest_angles)
+    return Start(network, posed, licence_of(bundle.folder), bundle.model_hash), config
 
 
 def _weights(bundle: Bundle) -> dict[str, np.ndarray]:

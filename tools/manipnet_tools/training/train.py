@@ -11,6 +11,7 @@ import torch
 
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.model.layout import layout_of
+from manipnet_tools.terminal import open_console
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import Samples, TakeSet, load_captured_hands
 from manipnet_tools.training.model import ManipNet, normalisation
@@ -86,17 +87,17 @@ def train(
     config: TrainConfig,
     share: float = 1.0,
     start: Start | None = None,
-    after_round: Callable[[Trained], None] = lambda trained: None,
+    after_round: Callable[[Trained, str], None] = lambda trained, text: _log.info(text),
 ) -> Trained:
     """Train on the first `share` of each take, from the weights of `start` or from random ones.
 
     The same seed gives the same result. Training uses one thread, because with the small batches that train best, a
-    second thread mostly waits. `after_round` receives the model as it is after each round.
+    second thread mostly waits. `after_round` receives the model as it is after each round, and a line about it.
     """
     started = time.monotonic()
     torch.set_num_threads(1)
     torch.manual_seed(config.seed)
-    sampler = RoundSampler(sets, config, share, None if start is None else start.hand)
+    sampler = RoundSampler(sets, config, share, None if start is None else start.posed)
     samples = sampler.next_round(None if start is None else start.network)
     trainer = Trainer(new_model(sampler.hand, samples, config) if start is None else start.network, config)
     for turn in range(config.rounds):
@@ -104,9 +105,8 @@ def train(
             samples = sampler.next_round(trainer.model)
         loss = trainer.learn(samples)
         elapsed_s = time.monotonic() - started
-        text = "round %d/%d  %d samples  loss %.4f  %.0f s"
-        _log.info(text, turn + 1, config.rounds, len(samples), loss, elapsed_s)
-        after_round(trained(trainer, sampler, sets, config, share, elapsed_s))
+        text = f"round {turn + 1}/{config.rounds}  {len(samples)} samples  loss {loss:.4f}  {elapsed_s:.0f} s"
+        after_round(trained(trainer, sampler, sets, config, share, elapsed_s), text)
     return trained(trainer, sampler, sets, config, share, time.monotonic() - started)
 
 
@@ -130,5 +130,10 @@ def run(options: TrainOptions) -> None:
     if options.start is not None:
         start, config = read_start(options.start, config)
     sets = [TakeSet(load_captured_hands(each.path, each.takes), each.weight) for each in options.folders()]
-    licence = options.licence()
-    train(sets, config, options.share, start, lambda now: save_bundle(replace(now, licence=licence), options.out))
+    licence, console = options.licence(), open_console()
+
+    def keep(now: Trained, text: str) -> None:
+        save_bundle(replace(now, licence=licence, started_from=start and start.bundle_hash), options.out)
+        console.print(text)
+
+    train(sets, config, options.share, start, keep)

@@ -34,6 +34,8 @@ class Trained:
     """Time that training took."""
     licence: str = MANIPNET_LICENCE
     """The terms of the takes, which are those of the model."""
+    started_from: str | None = None
+    """SHA-256 of the bundle whose weights training went on from."""
 
 
 def save_bundle(trained: Trained, folder: Path) -> None:
@@ -42,6 +44,7 @@ def save_bundle(trained: Trained, folder: Path) -> None:
         **asdict(trained.config),
         "takes": list(trained.takes),
         "share": trained.share,
+        "started_from": trained.started_from,
         "minutes": round(trained.seconds / 60, 1),
         "date": date.today().isoformat(),
     }

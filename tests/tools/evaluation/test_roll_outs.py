@@ -1,0 +1,27 @@
+"""A model is evaluated on the hand that was captured, whatever hand it was trained for."""
+
+import numpy as np
+
+from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.validation import check_hand
+from manipnet.synthesis.model.bundle import load_bundle
+from manipnet.synthesis.model.shipped import shipped_hand
+from manipnet_tools.evaluation.roll_outs import posing
+from manipnet_tools.generate.free_hand import free_hand
+
+
+def test_a_model_of_the_captured_hand_is_evaluated_as_it_is():
+    bundle = load_bundle()
+    assert posing(bundle, shipped_hand()) is bundle
+
+
+def test_a_model_of_another_hand_poses_the_captured_one():
+    bundle, free = load_bundle(), free_hand()
+    posed = posing(bundle, free)
+    check_hand(posed.hand)
+    angles = np.random.default_rng(0).uniform(*free.limits.T, (20, free.angle_count))
+    joints = [forward_kinematics(hand, angles)[0] for hand in (posed.hand, free)]
+    np.testing.assert_allclose(*joints, atol=1e-9)
+    at_rest = [forward_kinematics(hand, bundle.rest_angles)[1] for hand in (posed.hand, bundle.hand)]
+    np.testing.assert_allclose(*at_rest, atol=1e-9)
+    assert ((posed.limits[:, 0] <= posed.rest_angles) & (posed.rest_angles <= posed.limits[:, 1])).all()
