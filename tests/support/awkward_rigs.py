@@ -12,6 +12,8 @@ from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.export.glb import Buffer
 
 WORDS = ("Thumb", "Index", "Middle", "Ring", "Pinky")
+RADIUS_M = 0.007
+"""The skin's distance from the bones of the fingers."""
 ARMATURE = np.eye(4)
 ARMATURE[:3, :3] = 0.01 * quat_to_matrix(quat_exp(np.array([-np.pi / 2, 0.0, 0.0])))
 
@@ -48,6 +50,17 @@ def awkward_rig(path: Path, bend_rad: float = 0.3) -> Path:
     return path
 
 
+def _rings(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Points `(24, 3)` of a skin around a bone."""
+    along = end - start
+    u = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    u /= np.linalg.norm(u)
+    v = np.cross(along / np.linalg.norm(along), u)
+    turns = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)[:, None]
+    ring = RADIUS_M * (np.cos(turns) * u + np.sin(turns) * v)
+    return np.concatenate([start + t * along + ring for t in (0.4, 0.6, 0.8)])
+
+
 def _write(path: Path, names: list[str], parents: list[int], world: np.ndarray) -> None:
     buffer, nodes = Buffer(), []
     for k, (name, parent) in enumerate(zip(names, parents, strict=True)):
@@ -57,9 +70,12 @@ def _write(path: Path, names: list[str], parents: list[int], world: np.ndarray) 
             node["children"] = children
         nodes.append(node)
     around = np.array([[0.004, 0, 0], [-0.004, 0, 0], [0, 0.004, 0], [0, -0.004, 0], [0, 0, 0.004], [0, 0, -0.004]])
-    vertices = (world[:, None, :3, 3] + around).reshape(-1, 3)
+    below = [k for k, p in enumerate(parents) if p >= 0 and names[p][-1].isdigit()]
+    rings = [(k, _rings(world[parents[k], :3, 3], world[k, :3, 3])) for k in below]
+    vertices = np.concatenate([(world[:, None, :3, 3] + around).reshape(-1, 3), *(points for _, points in rings)])
     owners = np.zeros((len(vertices), 4), np.uint8)
-    owners[:, 0] = np.repeat(np.arange(len(names)), len(around))
+    owned = [np.repeat(np.arange(len(names)), len(around)), *(np.full(len(p), parents[k]) for k, p in rings)]
+    owners[:, 0] = np.concatenate(owned)
     faces = (np.array([[0, 2, 4], [0, 4, 3], [1, 4, 2], [1, 3, 4]]) + 6 * np.arange(len(names))[:, None, None]).ravel()
     attributes = {
         "POSITION": buffer.add(vertices.astype(np.float32), bounds=True),

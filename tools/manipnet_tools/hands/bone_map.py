@@ -1,7 +1,7 @@
 """Which bone of a rig is which OpenXR joint: by the vocabulary of names, or by a map that a user writes."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -32,14 +32,26 @@ def map_bones(skeleton: Skeleton, where: str) -> dict[Side, BoneMap]:
             continue
         found = {FINGERS[f][part + (f > 0)]: number[name] for (f, part), name in bones.fingers.items()}
         found |= {FINGERS[f][0]: number[name] for f, name in bones.metacarpals.items()}
+        _check_distinct(skeleton, [*bones.fingers.values(), *bones.metacarpals.values(), bones.hand or ""], where)
         hand = number.get(bones.hand or "")
         hands[side] = found | {1: _common_parent(skeleton, found) if hand is None else hand}
+    if not skeleton.names:
+        raise RigFileError(f"{where}: holds no bones; export the skeleton of the avatar with its mesh")
     if not hands:
         raise RigFileError(
             f"{where}: no finger bones are recognised among {', '.join(skeleton.names[:12])}"
             f"{' …' * (len(skeleton.names) > 12)}; rename them, or say which is which with --map"
         )
     return hands
+
+
+def _check_distinct(skeleton: Skeleton, names: Iterable[str], where: str) -> None:
+    """Raise `RigFileError` if one of the names is that of several bones."""
+    if shared := next((name for name in names if plain(name) in skeleton.ambiguous), None):
+        raise RigFileError(
+            f"{where}: several bones are called {shared!r}, as in a file of several characters; export one of them "
+            "into a file of its own, or rename the bones of the others"
+        )
 
 
 def read_map(path: Path, skeleton: Skeleton) -> dict[Side, BoneMap]:
@@ -63,20 +75,36 @@ def read_map(path: Path, skeleton: Skeleton) -> dict[Side, BoneMap]:
     hands: dict[Side, BoneMap] = {}
     for side in SIDES:
         if side in content:
+            if not isinstance(content[side], Mapping):
+                raise RigFileError(f"{path}: {side} must be {{joint: name of a bone}}, not {str(content[side])[:40]!r}")
             hands[side] = {_joint(path, name): _bone(path, bone, skeleton) for name, bone in content[side].items()}
             if JOINTS["wrist"] not in hands[side]:
                 raise RigFileError(f"{path}: {side} has no wrist; give the bone of the hand as wrist")
+    _check_used_once(path, hands, skeleton)
     return hands
+
+
+def _check_used_once(path: Path, hands: Mapping[Side, BoneMap], skeleton: Skeleton) -> None:
+    seen: dict[int, str] = {}
+    for side, bones in hands.items():
+        for joint, bone in bones.items():
+            here = f"{side} {OPENXR_JOINT_NAMES[joint]}"
+            if bone in seen:
+                name = skeleton.names[bone]
+                raise RigFileError(f"{path}: the bone {name!r} is given for {seen[bone]} and for {here}; it can be one")
+            seen[bone] = here
 
 
 def _read_names(path: Path, content: Mapping[str, str], skeleton: Skeleton) -> dict[Side, BoneMap]:
     """The hands of a rig in which the named bones have the names that the map gives them."""
-    names = list(skeleton.names)
+    given: dict[int, str] = {}
     for known, bone in content.items():
         if plain(known) not in _known_names():
             raise RigFileError(f"{path}: {known!r} is not a name that a known program gives to a bone of a hand")
-        names[_bone(path, bone, skeleton)] = known
-    return map_bones(replace(skeleton, names=names), str(path))
+        given[_bone(path, bone, skeleton)] = known
+    taken = {plain(known) for known in given.values()}
+    names = [given.get(k, f"{n} (not mapped)" if plain(n) in taken else n) for k, n in enumerate(skeleton.names)]
+    return map_bones(replace(skeleton, names=names, ambiguous=skeleton.ambiguous - taken), str(path))
 
 
 @cache
@@ -98,6 +126,8 @@ def _joint(path: Path, name: str) -> int:
 def _bone(path: Path, bone: object, skeleton: Skeleton) -> int:
     if bone not in skeleton.names:
         raise RigFileError(f"{path}: the rig has no bone {bone!r}; its bones are {', '.join(skeleton.names)}")
+    if skeleton.names.count(str(bone)) > 1:
+        raise RigFileError(f"{path}: the rig has several bones {bone!r}; rename them in the file of the avatar")
     return skeleton.names.index(str(bone))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from manipnet.geometry import Array
 from manipnet.synthesis.objects.glb import glb_chunks, read_glb_rig
 from manipnet.synthesis.objects.glb_accessors import GlbError
+from manipnet.wire.rig_names import plain
 from manipnet_tools.commands.options import RIG_SUFFIXES
 from manipnet_tools.takes.bvh_motion import BvhError, Joint, read_bvh
 
@@ -42,11 +43,14 @@ class Skeleton:
     """The JSON document and the binary chunk of a glTF file; its bones have the numbers of the nodes."""
     joints: tuple[Joint, ...] = ()
     """The joints of a BVH file."""
+    ambiguous: frozenset[str] = frozenset()
+    """Plain names that several bones share."""
 
     def main_owners(self) -> NDArray[np.int64]:
-        """The bone that moves each vertex most, `(V,)`."""
+        """The bone that moves each vertex most, `(V,)`; -1 for a vertex that no bone moves."""
         most = self.weights.argmax(axis=1) if len(self.weights) else np.empty(0, np.int64)
-        return self.owners[np.arange(len(most)), most]
+        rows = np.arange(len(most))
+        return np.where(self.weights[rows, most] > 0.0, self.owners[rows, most], -1)
 
     def children(self, bone: int) -> list[int]:
         """The bones that hang on a bone."""
@@ -71,8 +75,30 @@ def read_skeleton(path: Path) -> Skeleton:
 def _from_glb(path: Path) -> Skeleton:
     data = path.read_bytes()
     rig = read_glb_rig(data)
-    skin = rig.vertices, rig.faces, rig.owners, rig.weights
-    return Skeleton(rig.names, rig.parents, rig.positions, {}, *skin, in_metres=True, document=glb_chunks(data))
+    skin, (document, binary) = (rig.vertices, rig.faces, rig.owners, rig.weights), glb_chunks(data)
+    skinned = {joint for skin in document.get("skins", []) for joint in skin["joints"]}
+    bare = {n for n, node in enumerate(document.get("nodes", [])) if "mesh" not in node}
+    names, ambiguous = _told_apart(rig.names, [set(rig.humanoid), skinned, bare])
+    return Skeleton(names, rig.parents, rig.positions, {}, *skin, True, (document, binary), ambiguous=ambiguous)
+
+
+def _told_apart(names: list[str], likely: list[set[int]]) -> tuple[list[str], frozenset[str]]:
+    """The names of the bones, and the plain names that several of them share.
+
+    Of nodes that share one, the only one in the first of the sets `likely` that has any is the bone, and the number of
+    the node is added to the names of the others.
+    """
+    sharing: dict[str, list[int]] = {}
+    for n, name in enumerate(names):
+        sharing.setdefault(plain(name), []).append(n)
+    names, ambiguous = list(names), set()
+    for name, nodes in sharing.items():
+        kept = next((found for group in likely if (found := [n for n in nodes if n in group])), nodes)
+        if len(kept) > 1:
+            ambiguous.add(name)
+        for n in set(nodes) - set(kept):
+            names[n] = f"{names[n]} (node {n})"
+    return names, frozenset(ambiguous)
 
 
 def _from_bvh(path: Path) -> Skeleton:
@@ -82,5 +108,9 @@ def _from_bvh(path: Path) -> Skeleton:
         heads[k] = np.array(joint.offset) + (heads[joint.parent] if joint.parent >= 0 else 0.0)
     ends = {k: heads[k] + np.array(joint.end) for k, joint in enumerate(joints) if joint.end is not None}
     no_skin = np.empty((0, 3)), np.empty((0, 3), np.int64), np.empty((0, 4), np.int64), np.empty((0, 4))
-    names, parents = [joint.name for joint in joints], [joint.parent for joint in joints]
-    return Skeleton(names, parents, heads, ends, *no_skin, in_metres=False, joints=joints)
+    names, ambiguous = _told_apart([joint.name for joint in joints], [])
+    if not np.isfinite(heads).all():
+        joint = joints[int(np.argwhere(~np.isfinite(heads))[0, 0])]
+        raise RigFileError(f"{path}: the offset of joint {joint.name!r} is not finite; export the file again")
+    parents = [joint.parent for joint in joints]
+    return Skeleton(names, parents, heads, ends, *no_skin, in_metres=False, joints=joints, ambiguous=ambiguous)

@@ -11,7 +11,7 @@ from manipnet.geometry import MIRROR, Array, Side, compose, matrix_to_quat, mirr
 from manipnet.synthesis.hand.avatar import model_profile, openxr_frame
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.openxr import METACARPAL_BASE
-from manipnet.synthesis.hand.profile import FINGERS
+from manipnet.synthesis.hand.profile import FINGERS, SAME_PLACE_M
 from manipnet_tools.hands.bone_map import BoneMap
 from manipnet_tools.hands.rig_file import RigFileError, Skeleton
 
@@ -86,12 +86,14 @@ class _RigHand:
         joints, radii = np.full((26, 7), np.nan), np.full(26, np.nan)
         joints[1] = [0, 0, 0, 0, 0, 0, 1]
         bind = joints.copy()
-        named = []
+        named: list[str] = []
+        found: list[int] = []
         for row in FINGERS:
-            chain = [k for k in (row if row is FINGERS[0] else row[1:])[:-1] if k in self._bones]
+            chain = self._chain(row)
             if not chain:
                 continue
             named.append(f"{len(chain)} bones of the {_finger(row)}")
+            found += chain
             self._add_finger(row, chain, joints, bind, radii)
             if row is not FINGERS[0]:
                 base = (
@@ -104,11 +106,28 @@ class _RigHand:
         middle = joints[12] if not np.isnan(joints[12, 0]) else np.mean(knuckles, axis=0)
         joints[0] = [*(0.5 * (1.0 + METACARPAL_BASE) * middle[:3]), 0, 0, 0, 1]
         self._say(f"hand bone {self._skeleton.names[self._bones[1]]}; " + ", ".join(named))
+        unknown = int(np.isnan(radii[found]).sum())
+        if len(self._skin) and unknown:
+            self._say(f"the skin does not show the radii of {unknown} bones; they are guessed from their lengths")
         in_palm = [0, *(row[0] for row in FINGERS[1:])]
         bind[in_palm] = joints[in_palm]
         if self._side == "left":
             joints, bind = mirror_poses(joints), mirror_poses(bind)
         return RigHand(self._bones, joints, radii, compose(self._wrist, bind), *self._t_pose())
+
+    def _chain(self, row: tuple[int, ...]) -> list[int]:
+        """The joints of a finger, without those that lie where the one before them does."""
+        chain: list[int] = []
+        for k in (row if row is FINGERS[0] else row[1:])[:-1]:
+            if k not in self._bones:
+                continue
+            here = self._points[self._bones[k]]
+            if chain and np.linalg.norm(here - self._points[self._bones[chain[-1]]]) < SAME_PLACE_M:
+                name = self._skeleton.names[self._bones[k]]
+                self._say(f"the bone {name} lies where the one before it does, so it is left out")
+            else:
+                chain.append(k)
+        return chain
 
     def _t_pose(self) -> tuple[Array | None, Array | None]:
         """The joints `(26, 3)` and the elbow in the T-pose of an avatar that faces +z; None for another rest pose."""
@@ -147,6 +166,11 @@ class _RigHand:
                 f"{self._where}: the {self._side} hand has only one finger, so its palm cannot be found; use --map"
             )
         ours = np.array([self._points[self._bones[k]] for k in roots])
+        if np.abs(ours).max() < SAME_PLACE_M:
+            raise RigFileError(
+                f"{self._where}: the knuckles of the {self._side} hand lie where its wrist is, because the bones have "
+                "no lengths at rest; export the rig with its rest pose"
+            )
         theirs = self._model.joints[roots, :3]
         u, _, v = np.linalg.svd(ours.T @ theirs)
         handed = np.sign(np.linalg.det(u @ v))
@@ -157,6 +181,12 @@ class _RigHand:
             raise RigFileError(
                 f"{self._where}: the knuckles of the {self._side} hand do not lie side by side as on a hand "
                 f"({1000 * error:.0f} mm off); check the names of its bones, or give --map"
+            )
+        across = [(ours @ turn)[n, 0] for n, k in enumerate(roots) if k != FINGERS[0][0]]
+        if any(b <= a for a, b in pairwise(across)):
+            raise RigFileError(
+                f"{self._where}: the fingers of the {self._side} hand do not lie in the order index, middle, ring, "
+                "little finger; check the names of its bones, or give --map"
             )
         return self._palm_up(turn, roots)
 

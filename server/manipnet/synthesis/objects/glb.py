@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from manipnet.synthesis.objects.glb_accessors import Accessors, GlbError, check_size
 from manipnet.synthesis.objects.glb_draco import DRACO, decode_draco
+from manipnet.synthesis.objects.glb_nodes import matrix_of, node_parents, node_worlds
 
 READ: Final = {
     DRACO,
@@ -25,10 +26,11 @@ READ: Final = {
 MESHOPT: Final = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 APPEARANCE: Final = (
     *("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "EXT_lights_", "MSFT_lod"),
-    *("KHR_xmp", "KHR_animation", "KHR_audio", "ADOBE_materials_", "EXT_materials_", "VRMC_", "EXT_lights"),
+    *("KHR_xmp", "KHR_animation", "KHR_audio", "ADOBE_materials_", "EXT_materials_", "VRM", "EXT_lights"),
 )
 """Extensions that begin so leave the surface as it is."""
 MAX_INSTANCES: Final = 10_000
+_HUGE_M: Final = 1e9
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
@@ -98,13 +100,17 @@ class GlbRig:
     """`(V, 4)` the nodes that move each vertex."""
     weights: NDArray[np.float64]
     """`(V, 4)` how much each of them moves it."""
+    humanoid: frozenset[int]
+    """The nodes that a VRM file maps to a humanoid."""
 
 
 def read_glb_rig(data: bytes) -> GlbRig:
     """The skeleton of a glTF Binary or VRM file. Raises `GlbError`."""
     document, binary = glb_chunks(data)
     try:
-        return _Scene(document, binary).rig()
+        _check_extensions(document)
+        with np.errstate(all="ignore"):  # numbers that are not finite are refused with the name of their node
+            return _Scene(document, binary).rig()
     except GlbError:
         raise
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, RecursionError, OverflowError) as error:
@@ -113,8 +119,7 @@ def read_glb_rig(data: bytes) -> GlbRig:
 
 def node_matrices(document: dict[str, Any]) -> NDArray[np.float64]:
     """The matrices `(N, 4, 4)` from the nodes of a document to its scene. Raises `GlbError`."""
-    scene = _Scene(document, b"")
-    return np.array([scene.world(n) for n in range(len(document.get("nodes", [])))]).reshape(-1, 4, 4)
+    return np.array(_Scene(document, b"").worlds).reshape(-1, 4, 4)
 
 
 def _humanoid_names(document: dict[str, Any]) -> dict[int, str]:
@@ -133,7 +138,8 @@ class _Scene:
     def __init__(self, document: dict[str, Any], binary: bytes) -> None:
         self._document, self._accessors = document, Accessors(document, binary)
         self._nodes: list[dict[str, Any]] = document.get("nodes", [])
-        self._parents = {child: n for n, node in enumerate(self._nodes) for child in node.get("children", [])}
+        self._parents = node_parents(self._nodes)
+        self.worlds = node_worlds(self._nodes, self._parents)
         self._required = set(document.get("extensionsRequired", []))
 
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -157,17 +163,28 @@ class _Scene:
         """The nodes and the skinned vertices."""
         humanoid = _humanoid_names(self._document)
         names = [humanoid.get(n, str(node.get("name", n))) for n, node in enumerate(self._nodes)]
-        positions = np.array([self.world(n)[:3, 3] for n in range(len(self._nodes))]).reshape(-1, 3)
+        positions = np.array(self.worlds).reshape(-1, 4, 4)[:, :3, 3]
+        for name, place in zip(names, positions, strict=True):
+            if not (np.abs(place) < _HUGE_M).all():
+                raise GlbError(f"has a node {name!r} whose place is not finite; export it again")
         vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), np.int64)]
         owners, weights, total = [np.empty((0, 4), np.int64)], [np.empty((0, 4))], 0
         for n, node in enumerate(self._nodes):
             if "skin" not in node or "mesh" not in node:
                 continue
             joints = np.array(self._document["skins"][node["skin"]]["joints"], np.int64)
+            if joints.min() < 0:
+                raise GlbError("is a damaged glTF file (a skin has a joint with a negative number); export it again")
             for primitive in self._document["meshes"][node["mesh"]]["primitives"]:
                 attributes = primitive["attributes"]
-                if "JOINTS_0" not in attributes or (part := self._primitive(n, primitive, [])) is None:
+                if "JOINTS_0" not in attributes:
                     continue
+                if self._is_draco(primitive):
+                    raise GlbError(f"has a skin that is compressed with {DRACO}; export it without compression")
+                if (part := self._primitive(n, primitive, [])) is None:
+                    continue
+                if not (np.abs(part[0]) < _HUGE_M).all():
+                    raise GlbError(f"has vertices in the mesh of {names[n]!r} that are not finite; export it again")
                 vertices.append(part[0])
                 faces.append(total + part[1])
                 owners.append(joints[self._accessors.read(attributes["JOINTS_0"], 4).astype(np.int64)])
@@ -175,7 +192,8 @@ class _Scene:
                 total += len(part[0])
         parents = [self._parents.get(n, -1) for n in range(len(self._nodes))]
         points, corners = np.concatenate(vertices), np.concatenate(faces)
-        return GlbRig(names, parents, positions, points, corners, np.concatenate(owners), np.concatenate(weights))
+        skin = points, corners, np.concatenate(owners), np.concatenate(weights)
+        return GlbRig(names, parents, positions, *skin, frozenset(humanoid))
 
     def _visible(self) -> list[int]:
         """The nodes of the scene in order, without those that are hidden."""
@@ -211,9 +229,8 @@ class _Scene:
         if mode not in (_TRIANGLES, _STRIP, _FAN):
             return None
         position = primitive["attributes"]["POSITION"]
-        compressed = _extension(primitive, DRACO)
-        if compressed and (DRACO in self._required or not self._accessors.has_data(position)):
-            points, corners = decode_draco(self._accessors.view(compressed["bufferView"]))
+        if self._is_draco(primitive):
+            points, corners = decode_draco(self._accessors.view(_extension(primitive, DRACO)["bufferView"]))
         else:
             points = self._accessors.read(position, 3)
             indices = primitive.get("indices")
@@ -229,9 +246,14 @@ class _Scene:
         skin = self._nodes[node].get("skin")
         return (points if skin is None else self._skinned(points, primitive["attributes"], skin)), corners
 
+    def _is_draco(self, primitive: dict[str, Any]) -> bool:
+        """Whether a primitive has its data only in compressed form, or is to be read from it."""
+        has_data = self._accessors.has_data(primitive["attributes"]["POSITION"])
+        return bool(_extension(primitive, DRACO)) and (DRACO in self._required or not has_data)
+
     def _instances(self, node: int) -> list[NDArray]:
         """The world matrices of a node's copies."""
-        world = self.world(node)
+        world = self.worlds[node]
         attributes = _extension(self._nodes[node], "EXT_mesh_gpu_instancing").get("attributes")
         if not attributes:
             return [world]
@@ -243,28 +265,12 @@ class _Scene:
         count = min(map(len, parts.values()), default=1)
         if count > MAX_INSTANCES:
             raise GlbError(f"has {count} copies of one mesh; at most {MAX_INSTANCES} are allowed")
-        return [world @ _matrix(**{name.lower(): values[i] for name, values in parts.items()}) for i in range(count)]
-
-    def world(self, node: int) -> NDArray:
-        """The matrix from a node to the scene."""
-        matrix, passed = np.eye(4), 0
-        at: int | None = node
-        while at is not None:
-            own = self._nodes[at]
-            local = (
-                np.array(own["matrix"], dtype=np.float64).reshape(4, 4).T
-                if "matrix" in own
-                else _matrix(**{part: own[part] for part in ("translation", "rotation", "scale") if part in own})
-            )
-            matrix, at, passed = local @ matrix, self._parents.get(at), passed + 1
-            if passed > len(self._nodes):
-                raise GlbError("is a damaged glTF file (its nodes contain each other); export it again")
-        return matrix
+        return [world @ matrix_of(**{name.lower(): values[i] for name, values in parts.items()}) for i in range(count)]
 
     def _skinned(self, points: NDArray, attributes: dict[str, int], skin: int) -> NDArray:
         """Vertices as the joints of a skin place them in the pose of the file."""
         joints = self._document["skins"][skin]["joints"]
-        matrices = np.stack([self.world(joint) for joint in joints])
+        matrices = np.stack([self.worlds[joint] for joint in joints])
         if (inverse := self._document["skins"][skin].get("inverseBindMatrices")) is not None:
             matrices = matrices @ self._accessors.read(inverse, 16)[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
         ones = np.concatenate([points, np.ones((len(points), 1))], axis=1)
@@ -289,21 +295,6 @@ def _corners(indices: NDArray, mode: int) -> NDArray:
     if mode == _FAN:
         return np.stack([indices[k + 1], indices[k + 2], np.broadcast_to(indices[:1], count)], axis=1)
     return np.stack([indices[k], indices[k + 1 + k % 2], indices[k + 2 - k % 2]], axis=1)
-
-
-def _matrix(translation: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1), scale: Any = (1, 1, 1)) -> NDArray:
-    x, y, z, w = np.asarray(rotation, dtype=np.float64) / max(float(np.linalg.norm(rotation)), 1e-12)
-    turn = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    matrix = np.eye(4)
-    matrix[:3, :3] = turn * np.asarray(scale, dtype=np.float64)
-    matrix[:3, 3] = translation
-    return matrix
 
 
 def _extension(part: dict[str, Any], name: str) -> dict[str, Any]:

@@ -37,11 +37,10 @@ class Accessors:
     def read(self, accessor: int, width: int) -> NDArray[np.float64]:
         """An array `(N, width)`. Raises `GlbError`."""
         entry = self._accessors[accessor]
-        count, kind = int(entry["count"]), entry["componentType"]
-        if WIDTHS.get(entry["type"]) != width or kind not in COMPONENTS or count < 0:
-            raise GlbError(
-                f"is a damaged glTF file (accessor {accessor} is {entry['type']} of {kind}); export it again"
-            )
+        count, kind = entry["count"], entry["componentType"]
+        if WIDTHS.get(entry["type"]) != width or kind not in COMPONENTS or not isinstance(count, int) or count < 0:
+            found = f"{entry['type']} of {kind}, {count!r} of them"
+            raise GlbError(f"is a damaged glTF file (accessor {accessor} is {found}); export it again")
         check_size(count * width // 3)
         values = np.zeros((count, width))
         if "bufferView" in entry:
