@@ -11,8 +11,8 @@ import numpy as np
 
 from manipnet import __version__
 from manipnet.geometry import SIDES, Side, compose, invert, matrix_to_quat
-from manipnet.synthesis.hand.avatar import model_radii
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.model_profile import model_radii
 from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.wire import rig_names

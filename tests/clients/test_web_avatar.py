@@ -15,7 +15,7 @@ from npm import run_node
 from rig_writer import write_glb
 
 from manipnet.geometry import SIDES, Side, quat_exp, quat_rotate
-from manipnet.synthesis.hand.avatar import model_profile
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.profile import FINGERS, parse_profile
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.hands.importing import import_profile

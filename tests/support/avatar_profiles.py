@@ -3,8 +3,8 @@
 import numpy as np
 
 from manipnet.geometry import SIDES
-from manipnet.synthesis.hand.avatar import model_profile
 from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.profile import FINGERS, HandProfile, ProfileHand
 
 

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import SIDES, Array, Side, quat_conjugate, quat_exp, quat_multiply, quat_rotate
-from manipnet.synthesis.hand.avatar import model_profile
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.profile import FINGERS
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.hands.rig_hand import TIP_SHARE

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from manipnet.geometry import SIDES, quat_exp, quat_to_matrix
-from manipnet.synthesis.hand.avatar import model_profile
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.profile import FINGERS
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.export.glb import Buffer

@@ -15,8 +15,9 @@ from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.synthesis.carrying import HandCarrier
-from manipnet.synthesis.hand.avatar import avatar_hand, model_profile
+from manipnet.synthesis.hand.avatar import avatar_hand
 from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.ik.pose import allocate_poses, pose_kernel
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle

@@ -11,9 +11,10 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import Array, Side, mirror_poses, quat_rotate
-from manipnet.synthesis.hand.avatar import OUR_JOINTS, AvatarHand
+from manipnet.synthesis.hand.avatar import AvatarHand
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.model_profile import OUR_JOINTS
 from manipnet.synthesis.hand.openxr import openxr_frames
 from manipnet.synthesis.hand.places import place_joints
 from manipnet.synthesis.hand.profile import FINGERS
@@ -23,9 +24,9 @@ from manipnet.synthesis.ik.carry import (
     MAX_SHIFT_M,
     PAD_WEIGHT,
     TIP_WEIGHT,
-    Samples,
     carry_contacts,
 )
+from manipnet.synthesis.ik.carry_samples import Samples
 from manipnet.synthesis.objects.shape import Shape
 from manipnet.wire.hand_names import BONE_NAMES, OPENXR_JOINT_NAMES
 

@@ -6,8 +6,9 @@ from avatar_profiles import scaled_profile
 
 from manipnet.geometry import SIDES, compose, quat_exp, quat_multiply
 from manipnet.synthesis.carrying import HandCarrier
-from manipnet.synthesis.hand.avatar import OUR_JOINTS, avatar_hand, model_profile
+from manipnet.synthesis.hand.avatar import avatar_hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.model_profile import OUR_JOINTS, model_profile
 from manipnet.synthesis.hand.profile import FINGERS, ProfileHand
 from manipnet.synthesis.hand.validation import check_hand
 from manipnet.synthesis.model.shipped import shipped_hand

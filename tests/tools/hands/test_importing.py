@@ -7,7 +7,7 @@ import pytest
 from rig_writer import write_glb
 
 from manipnet.geometry import SIDES, quat_exp, quat_rotate
-from manipnet.synthesis.hand.avatar import model_profile
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.profile import FINGERS, ProfileError, read_profile
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.cli import main

@@ -3,9 +3,10 @@
 import numpy as np
 
 from manipnet.geometry import Array, Side
-from manipnet.synthesis.hand.avatar import AvatarHand, avatar_hand, model_profile
+from manipnet.synthesis.hand.avatar import AvatarHand, avatar_hand
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.kinematics import forward_kinematics
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.profile import HandProfile
 from manipnet_tools.rendering import (
     SKIN_LEFT,

@@ -11,8 +11,9 @@ import numpy as np
 
 from manipnet.geometry import SIDES, Array, Side, invert, quat_rotate, transform
 from manipnet.synthesis.carrying import HandCarrier, Held
-from manipnet.synthesis.hand.avatar import AvatarHand, avatar_hand, model_profile
+from manipnet.synthesis.hand.avatar import AvatarHand, avatar_hand
 from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.openxr import pose_in_world
 from manipnet.synthesis.hand.profile import HandProfile
 from manipnet.synthesis.objects.shape import Shape

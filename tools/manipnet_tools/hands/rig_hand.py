@@ -8,8 +8,9 @@ from typing import Final
 import numpy as np
 
 from manipnet.geometry import MIRROR, Array, Side, compose, matrix_to_quat, mirror_poses, quat_to_matrix
-from manipnet.synthesis.hand.avatar import model_profile, openxr_frame
 from manipnet.synthesis.hand.hand import Hand
+from manipnet.synthesis.hand.hinges import openxr_frame
+from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.hand.openxr import METACARPAL_BASE
 from manipnet.synthesis.hand.profile import FINGERS, SAME_PLACE_M
 from manipnet_tools.hands.bone_map import BoneMap

@@ -15,26 +15,20 @@ import numpy as np
 from manipnet.geometry import (
     Array,
     Side,
-    compose,
-    invert,
     matrix_to_quat,
     mirror_poses,
-    quat_exp,
     quat_multiply,
     quat_rotate,
     quat_to_matrix,
 )
 from manipnet.synthesis.hand.hand import Hand, Indices, Sensors, Skin
+from manipnet.synthesis.hand.hinges import aim_hinges, bend_between, openxr_frame, turn_matrix, unit
 from manipnet.synthesis.hand.kinematics import forward_kinematics
-from manipnet.synthesis.hand.openxr import pose_in_world
+from manipnet.synthesis.hand.model_profile import OUR_BONES, OUR_JOINTS, model_radii
 from manipnet.synthesis.hand.places import OpenXrPlaces
 from manipnet.synthesis.hand.profile import FINGERS, ProfileHand, present_joints
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES
 
-OUR_BONES: Final = (0, 0, 2, 3, 4, 4, *(b for f in range(4) for b in (0, 5 + 3 * f, 6 + 3 * f, 7 + 3 * f, 7 + 3 * f)))
-"""`(26,)` the model's bone with which each OpenXR joint turns."""
-OUR_JOINTS: Final = (0, 0, 2, 3, 4, 17, *(j for f in range(4) for j in (0, 5 + 3 * f, 6 + 3 * f, 7 + 3 * f, 18 + f)))
-"""`(26,)` the model's joint that each OpenXR joint is; 0 for those in the palm."""
 EXTRA_LIMIT_RAD: Final = np.radians(10.0)
 """Fingers of other lengths need a little more than the captured range."""
 _Q_WRIST_OPENXR: Final = np.array([0.5, -0.5, -0.5, 0.5])
@@ -73,27 +67,6 @@ def avatar_hand(profile: ProfileHand, side: Side, model: Hand) -> AvatarHand:
     fingers = [_Finger(f, chain) for f, row in enumerate(FINGERS) if (chain := present_joints(joints, row))]
     radii = _radii(profile.radii, joints, fingers, model)
     return _Builder(joints, fingers, model).build(radii, bool(np.isnan(profile.radii).any()))
-
-
-def model_profile(model: Hand, side: Side) -> ProfileHand:
-    """The model's own hand as a profile."""
-    straight = np.zeros((1, model.angle_count))
-    _, world = pose_in_world(model, [side], straight, np.array([[0.0, 0, 0, 0, 0, 0, 1]]), 1.0)
-    return ProfileHand(compose(invert(world[0, 1]), world[0]), model_radii(model))
-
-
-def model_radii(model: Hand) -> Array:
-    """The radii of the model's capsules at the OpenXR joints where they start, `(26,)`; a tip has its bone's."""
-    of_start = {(int(s), int(e)): r for (s, e), r in zip(model.capsules, model.radii, strict=True)}
-    radii = np.full(len(OPENXR_JOINT_NAMES), np.nan)
-    for row in FINGERS:
-        for k, after in pairwise(row):
-            start, end = OUR_JOINTS[k], OUR_JOINTS[after]
-            radii[k] = of_start[(start, end)]
-        radii[row[-1]] = radii[row[-2]]
-    palm = radii[[row[0] for row in FINGERS[1:]]]
-    radii[:2] = palm.mean()
-    return radii
 
 
 def _canonical(joints: Array, side: Side) -> Array:
@@ -181,12 +154,12 @@ class _Builder:
 
     def _add_finger(self, finger: _Finger) -> None:
         start, after = finger.joints[:2]
-        direction = _unit(self._joints[after, :3] - self._joints[start, :3])
+        direction = unit(self._joints[after, :3] - self._joints[start, :3])
         first = _ROOT_ANGLES[finger.number]
         axes = [self._matrices[self._model.parents[b]] @ a for b, a in self._hinges(first)]
         along = self._model_direction(start, after)
-        turns = _aim(axes[0], axes[1], along, direction)
-        zero = (_turn(axes[0], turns[0]) @ _turn(axes[1], turns[1])).T @ self._frame(start, direction)
+        turns = aim_hinges(axes[0], axes[1], along, direction)
+        zero = (turn_matrix(axes[0], turns[0]) @ turn_matrix(axes[1], turns[1])).T @ self._frame(start, direction)
         bone = self._add_bone(start, 0, self._joints[start, :3], zero)
         for angle, axis, turn in zip(first, axes, turns, strict=True):
             self._add_angle(bone, axis, angle, turn)
@@ -197,17 +170,19 @@ class _Builder:
             self._add_phalanx(finger, before, here, there)
 
     def _add_phalanx(self, finger: _Finger, before: int, here: int, there: int) -> None:
-        came = _unit(self._joints[here, :3] - self._joints[before, :3])
-        along = _unit(self._joints[there, :3] - self._joints[here, :3])
+        came = unit(self._joints[here, :3] - self._joints[before, :3])
+        along = unit(self._joints[there, :3] - self._joints[here, :3])
         frame = self._frame(here, along)
         hinge = -frame[:, 0]
         model_bone = OUR_BONES[here]
         model_frame = self._model_frame(here)
-        bend = _bend(came, along, hinge)
-        bend -= _bend(self._model_direction(before, here), self._model_direction(here, there), -model_frame[:, 0])
+        bend = bend_between(came, along, hinge)
+        bend -= bend_between(
+            self._model_direction(before, here), self._model_direction(here, there), -model_frame[:, 0]
+        )
         parent = self.bone_of[before]
         axis = self.zero[parent].T @ hinge
-        rest = _turn(axis, bend).T @ self.zero[parent].T @ frame
+        rest = turn_matrix(axis, bend).T @ self.zero[parent].T @ frame
         offset = self.zero[parent].T @ (self._joints[here, :3] - self._joints[before, :3])
         bone = self._add_bone(here, parent, offset, rest)
         angle = int(np.flatnonzero(self._model.angle_bones == model_bone)[0])
@@ -253,7 +228,7 @@ class _Builder:
         return openxr_frame(along, self._frames[joint][:, 1])
 
     def _model_direction(self, start: int, end: int) -> Array:
-        return _unit(self._positions[OUR_JOINTS[end]] - self._positions[OUR_JOINTS[start]])
+        return unit(self._positions[OUR_JOINTS[end]] - self._positions[OUR_JOINTS[start]])
 
     def _model_frame(self, joint: int) -> Array:
         bone = OUR_BONES[joint]
@@ -261,7 +236,7 @@ class _Builder:
         hinge = self._matrices[self._model.parents[bone]] @ self._model.axes[angle]
         child = self._model.parents.tolist().index(bone)
         along = self._positions[child] - self._positions[bone]
-        return openxr_frame(_unit(along), np.cross(along, hinge))
+        return openxr_frame(unit(along), np.cross(along, hinge))
 
     def _capsules(self, chains: tuple[tuple[int, ...], ...], radii: Array) -> tuple[list, list]:
         capsules, sizes = [], []
@@ -298,41 +273,6 @@ class _Builder:
         for k, bone in self.bone_of.items():
             own[bone] = turns[k]
         return OpenXrPlaces(bones, points, turns, angle_of, matrix_to_quat(local), own)
-
-
-def openxr_frame(along: Array, back: Array) -> Array:
-    """Columns of the OpenXR frame of a bone that points `along`, whose back side faces about `back`."""
-    z = -_unit(along)
-    if np.linalg.norm(np.cross(back, z)) < 1e-3 * np.linalg.norm(back) + 1e-9:  # no hint: any direction across the bone
-        back = np.eye(3)[np.argmin(np.abs(z))]
-    x = _unit(np.cross(back, z))
-    return np.stack([x, np.cross(z, x), z], axis=1)
-
-
-def _unit(v: Array) -> Array:
-    return v / max(float(np.linalg.norm(v)), 1e-12)
-
-
-def _turn(axis: Array, angle: float) -> Array:
-    return quat_to_matrix(quat_exp(_unit(axis) * angle))
-
-
-def _bend(before: Array, after: Array, hinge: Array) -> float:
-    """The angle about a hinge from one direction to another."""
-    return float(np.arctan2(hinge @ np.cross(before, after), before @ after - (hinge @ before) * (hinge @ after)))
-
-
-def _aim(first: Array, second: Array, start: Array, end: Array) -> Array:
-    """The angles of two hinges, the second carried by the first, that turn the direction `start` nearest to `end`."""
-    angles = np.zeros(2)
-    for _ in range(20):
-        outer = _turn(first, angles[0])
-        inner = _turn(second, angles[1]) @ start
-        here = outer @ inner
-        jacobian = np.stack([np.cross(first, here), outer @ np.cross(second, inner)], axis=1)
-        step = np.linalg.solve(jacobian.T @ jacobian + 1e-3 * np.eye(2), jacobian.T @ (end - here))
-        angles += np.clip(step, -0.3, 0.3)
-    return angles
 
 
 def _no_skin(angles: int) -> Skin:
