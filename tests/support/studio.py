@@ -78,6 +78,11 @@ class Studio:
             assert time.monotonic() < give_up_s, "it never came to this"
         return message
 
+    def settle(self) -> None:
+        """Wait for twenty ticks. A browser sends what is typed some hundredths of a second late, but clicks at once."""
+        for _ in range(20):
+            self.subscriber.next()
+
     def box(self) -> dict[str, Any]:
         """What the body Box carries, as the server says."""
         give_up_s = time.monotonic() + PATIENCE_S
