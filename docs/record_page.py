@@ -61,12 +61,13 @@ def main(names: list[str]) -> None:
     for options, group in groupby(names or CLIPS, key=lambda name: CLIPS[name].options):
         with serving("--demo", *options, "--takes", str(takes)) as server:
             record(server)
+        with (
+            serving("--takes", str(takes)) as server,  # receives nothing, so the browser draws nothing but the take
+            tempfile.TemporaryDirectory() as profile,
+            browsing("chromium", server.addresses["page"], Path(profile)) as page,
+        ):
             for name in group:
-                with (
-                    tempfile.TemporaryDirectory() as profile,
-                    browsing("chromium", server.addresses["page"], Path(profile)) as page,
-                ):
-                    write(name, list(pictures(page, CLIPS[name])))
+                write(name, list(pictures(page, CLIPS[name])))
         (takes / f"{TAKE}.mcap").unlink()
 
 
@@ -89,7 +90,8 @@ def pictures(page: Page, clip: Clip) -> Iterator[Image.Image]:
     """Open the recording with the health panel folded away, and step through the clip."""
     width, height = clip.window
     page.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
-    page.wait_for(f"{TEXT}.includes('hands/s') && document.title === 'ManipNet Live'", PATIENCE_S)
+    page.call("Page.reload")
+    page.wait_for(f"{TEXT}.includes('Waiting for bodies') && document.title === 'ManipNet Live'", PATIENCE_S)
     page.evaluate(DISMISS)
     page.press((290.0, 7.0))  # the arrow that folds the left panel
     page.click("Takes", PATIENCE_S)
