@@ -58,7 +58,9 @@ CLIPS = {
 def main(names: list[str]) -> None:
     """Record, step through the recording, and write the pictures with these names."""
     takes = Path(tempfile.gettempdir()) / "takes"  # the page shows its name
+    file = takes / f"{TAKE}.mcap"
     for options, group in groupby(names or CLIPS, key=lambda name: CLIPS[name].options):
+        file.unlink(missing_ok=True)
         with serving("--demo", *options, "--takes", str(takes)) as server:
             record(server)
         with (
@@ -68,7 +70,7 @@ def main(names: list[str]) -> None:
         ):
             for name in group:
                 write(name, list(pictures(page, CLIPS[name])))
-        (takes / f"{TAKE}.mcap").unlink()
+        file.unlink()
 
 
 def record(server: LiveServer) -> None:
