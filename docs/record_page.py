@@ -43,11 +43,11 @@ class Clip:
     shown: tuple[int, int] = (440, 352)
     whole: bool = False
     """Whether the panel is in the picture, and the camera follows; otherwise it is the stage, and the camera stands."""
-    rate_hz: float = 10.0
+    rate_hz: float = 8.0
 
 
 CLIPS = {
-    "page": Clip((), (28.0, 39.0), (1200, 600), (960, 480), whole=True),
+    "page": Clip((), (28.0, 39.0), (1200, 600), (960, 480), whole=True, rate_hz=10.0),
     "take-cube": Clip((), (5.0, 9.0)),
     "take-cylinder": Clip((), (18.0, 22.0)),
     "take-bottle": Clip(SHAPES, (18.0, 22.0)),
