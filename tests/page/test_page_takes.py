@@ -12,7 +12,7 @@ NAMED = "[...document.querySelectorAll('input')].filter(one => one.value === '%s
 
 def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.type("Slate", "12A")
     page.type("Number", "3")
     studio.says("Record makes: 12A take 3")
@@ -54,7 +54,7 @@ def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Stud
 
 def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.type("Slate", "", enter=False)
     studio.says("Record makes: take, with date and time")
     page.click("Record")
@@ -67,7 +67,7 @@ def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> N
 
 def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.wait_for("[...document.querySelectorAll('input')].some(one => one.value.startsWith('12A take 1'))", PATIENCE_S)
     page.type("Note", "ran r r", field="textarea", enter=False)
     page.key("r")
@@ -79,7 +79,7 @@ def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
 
 def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.choose("Take", "spare.mcap")
     page.wait_for(NAMED % "spare", PATIENCE_S)
     page.choose("Take", "12A take 1.mcap")
