@@ -43,11 +43,11 @@ class Clip:
     shown: tuple[int, int] = (440, 352)
     whole: bool = False
     """Whether the panel is in the picture, and the camera follows; otherwise it is the stage, and the camera stands."""
-    rate_hz: float = 10.0
+    rate_hz: float = 8.0
 
 
 CLIPS = {
-    "page": Clip((), (28.0, 39.0), (1200, 600), (960, 480), whole=True),
+    "page": Clip((), (28.0, 39.0), (1200, 600), (960, 480), whole=True, rate_hz=10.0),
     "take-cube": Clip((), (5.0, 9.0)),
     "take-cylinder": Clip((), (18.0, 22.0)),
     "take-bottle": Clip(SHAPES, (18.0, 22.0)),
@@ -58,16 +58,19 @@ CLIPS = {
 def main(names: list[str]) -> None:
     """Record, step through the recording, and write the pictures with these names."""
     takes = Path(tempfile.gettempdir()) / "takes"  # the page shows its name
+    file = takes / f"{TAKE}.mcap"
     for options, group in groupby(names or CLIPS, key=lambda name: CLIPS[name].options):
+        file.unlink(missing_ok=True)
         with serving("--demo", *options, "--takes", str(takes)) as server:
             record(server)
+        with (
+            serving("--takes", str(takes)) as server,  # receives nothing, so the browser draws nothing but the take
+            tempfile.TemporaryDirectory() as profile,
+            browsing("chromium", server.addresses["page"], Path(profile)) as page,
+        ):
             for name in group:
-                with (
-                    tempfile.TemporaryDirectory() as profile,
-                    browsing("chromium", server.addresses["page"], Path(profile)) as page,
-                ):
-                    write(name, list(pictures(page, CLIPS[name])))
-        (takes / f"{TAKE}.mcap").unlink()
+                write(name, list(pictures(page, CLIPS[name])))
+        file.unlink()
 
 
 def record(server: LiveServer) -> None:
@@ -89,7 +92,8 @@ def pictures(page: Page, clip: Clip) -> Iterator[Image.Image]:
     """Open the recording with the health panel folded away, and step through the clip."""
     width, height = clip.window
     page.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
-    page.wait_for(f"{TEXT}.includes('hands/s') && document.title === 'ManipNet Live'", PATIENCE_S)
+    page.call("Page.reload")
+    page.wait_for(f"{TEXT}.includes('Waiting for bodies') && document.title === 'ManipNet Live'", PATIENCE_S)
     page.evaluate(DISMISS)
     page.press((290.0, 7.0))  # the arrow that folds the left panel
     page.click("Takes", PATIENCE_S)

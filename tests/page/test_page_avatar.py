@@ -16,7 +16,7 @@ def test_an_avatar_is_dropped_and_taken_off_again(studio: Studio, tmp_path: Path
     studio.page.drop("hero.glb", write_glb(tmp_path / "hero.glb", nodes, skins=skins))
     studio.page.wait_for(NOTE % "actor has the hand hero", PATIENCE_S)
     assert studio.server.ask({"op": "status"})["hand_profiles"] == [["hero", "actor"]]
-    studio.page.click("Hands")
+    studio.open("Hands")
     studio.page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'hero')", PATIENCE_S)
     studio.page.choose("Hand", "the model's hand")
     studio.page.wait_for("![...document.querySelectorAll('input')].some(one => one.value === 'hero')", PATIENCE_S)

@@ -48,7 +48,7 @@ def test_look_ahead_and_layers(studio: Studio) -> None:
 
 def test_an_object_is_chosen_sized_and_placed(studio: Studio) -> None:
     box = studio.box
-    studio.page.click("Objects")
+    studio.open("Objects")
     studio.page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'Box')", PATIENCE_S)
     studio.page.choose("Object", "sphere")
     studio.until(lambda _: box()["object"] == "sphere")
@@ -66,7 +66,7 @@ def test_an_object_is_chosen_sized_and_placed(studio: Studio) -> None:
 
 
 def test_an_object_is_dragged_in_the_scene(studio: Studio) -> None:
-    studio.page.click("Objects")
+    studio.open("Objects")
     studio.page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'Box')", PATIENCE_S)
     studio.page.choose("Body", "Box")
     before = np.array(studio.box()["position"])
@@ -82,7 +82,7 @@ def test_an_object_is_dragged_in_the_scene(studio: Studio) -> None:
 
 
 def test_a_mesh_is_imported_with_the_button(studio: Studio) -> None:
-    studio.page.click("Objects")
+    studio.open("Objects")
     studio.page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'Box')", PATIENCE_S)
     studio.page.choose("Unit of the file", "cm")
     mesh = studio.rig.parent / "pestle.obj"
@@ -94,7 +94,7 @@ def test_a_mesh_is_imported_with_the_button(studio: Studio) -> None:
 
 
 def test_changes_are_undone_reset_and_saved(studio: Studio) -> None:
-    studio.page.click("Objects")
+    studio.open("Objects")
     studio.page.wait_for("[...document.querySelectorAll('input')].some(one => one.value === 'Box')", PATIENCE_S)
     before = studio.box()
     studio.page.choose("Object", "torus")
@@ -115,7 +115,7 @@ def test_changes_are_undone_reset_and_saved(studio: Studio) -> None:
 def test_wrists_and_the_size_of_hands_are_calibrated_and_the_quality_is_told(studio: Studio) -> None:
     studio.bodies["Box"] = np.array([0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 1.0])  # half of it is above the sheet's centre
     studio.until(lambda message: pose_of(message, "Box")[0] == 0.0)
-    studio.page.click("Calibrate")
+    studio.open("Calibrate")
     studio.page.choose("Sheet position", "under Box")
     studio.page.click("The hands are on the marks")
     studio.says("Good: the hands are 1.000 times")

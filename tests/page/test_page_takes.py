@@ -12,7 +12,7 @@ NAMED = "[...document.querySelectorAll('input')].filter(one => one.value === '%s
 
 def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.type("Slate", "12A")
     page.type("Number", "3")
     studio.says("Record makes: 12A take 3")
@@ -54,7 +54,7 @@ def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Stud
 
 def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.type("Slate", "", enter=False)
     studio.says("Record makes: take, with date and time")
     page.click("Record")
@@ -67,10 +67,11 @@ def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> N
 
 def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.wait_for("[...document.querySelectorAll('input')].some(one => one.value.startsWith('12A take 1'))", PATIENCE_S)
     page.type("Note", "ran r r", field="textarea", enter=False)
     page.key("r")
+    studio.settle()
     page.click("Keep changes")
     studio.says("note kept")
     assert studio.server.ask({"op": "recordings"})["recording"] is None
@@ -78,7 +79,7 @@ def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
 
 def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> None:
     page = studio.page
-    page.click("Takes")
+    studio.open("Takes")
     page.choose("Take", "spare.mcap")
     page.wait_for(NAMED % "spare", PATIENCE_S)
     page.choose("Take", "12A take 1.mcap")
@@ -89,10 +90,9 @@ def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> N
     page.type("Name", "best of all", enter=False)
     page.type("Its slate", "12B", enter=False)
     page.type("Its number", "3", enter=False)
+    studio.settle()
     page.click("Keep changes")
-    studio.until(lambda _: (studio.takes / "best of all.mcap").exists())
-    notes = json.loads((studio.takes / "best of all.json").read_text())
-    assert notes == {"slate": "12B", "number": 3, "note": "ran r rr"}
+    studio.until(lambda _: notes_of(studio, "best of all") == {"slate": "12B", "number": 3, "note": "ran r rr"})
     page.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(studio.rig.parent))
     page.click("Download")
     copy = studio.rig.parent / "best of all.mcap"
@@ -103,3 +103,9 @@ def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> N
     page.click("Delete …")
     page.click("Delete it", PATIENCE_S)
     studio.until(lambda _: [file.name for file in studio.takes.iterdir()] == ["spare.mcap"])
+
+
+def notes_of(studio: Studio, take: str) -> dict:
+    """What is kept about a take; nothing before it has that name."""
+    file = studio.takes / f"{take}.json"
+    return json.loads(file.read_text()) if file.exists() else {}

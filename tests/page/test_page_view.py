@@ -21,7 +21,7 @@ CONTACTS = """(() => {
 
 def test_the_camera_is_taken_and_given_back(studio: Studio) -> None:
     page = studio.page
-    page.click("View")
+    studio.open("View")
     page.wait_for(f"{FOLLOWING}", PATIENCE_S)
     x, y = page.evaluate(STAGE)
     page.drag((x, y + 120), (x + 90, y + 150))
@@ -36,7 +36,7 @@ def test_the_camera_is_taken_and_given_back(studio: Studio) -> None:
 
 def test_the_theme_is_light_or_dark_and_remembered(studio: Studio) -> None:
     page, scheme = studio.page, "document.documentElement.dataset.mantineColorScheme"
-    page.click("View")
+    studio.open("View")
     page.wait_for(f"{scheme} === 'dark'", PATIENCE_S)
     page.click("Light theme")
     page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
@@ -48,7 +48,7 @@ def test_the_theme_is_light_or_dark_and_remembered(studio: Studio) -> None:
 
 def test_presets_keep_what_is_seen_and_what_the_bodies_carry(studio: Studio) -> None:
     page, scheme = studio.page, "document.documentElement.dataset.mantineColorScheme"
-    page.click("View")
+    studio.open("View")
     page.type("Look-ahead, ms", "200")
     page.tick("Contacts")
     page.click("Light theme")
@@ -64,7 +64,7 @@ def test_presets_keep_what_is_seen_and_what_the_bodies_carry(studio: Studio) -> 
     studio.server.ask({"op": "select_object", "actor": "actor", "body": "Box", "object": "torus"})
     studio.until(lambda message: message.look_ahead == pytest.approx(0.3))
     page.call("Page.reload")
-    page.click("View", PATIENCE_S)
+    studio.open("View")
     page.wait_for(NAMED % "day", PATIENCE_S)  # this browser has kept it
     page.click("Use this preset")
     studio.until(lambda message: message.look_ahead == pytest.approx(0.2) and studio.box()["object"] == "cube")
@@ -85,7 +85,7 @@ def test_a_tablet_shows_stage_and_controls_side_by_side(studio: Studio) -> None:
     width = page.wait_for("parseFloat(getComputedStyle(document.documentElement).getPropertyValue('--mn-width'))")
     assert width > 350
     assert page.evaluate("document.documentElement.scrollWidth") == 768
-    page.click("Takes", PATIENCE_S)
+    studio.open("Takes")
     page.wait_for(f"{TEXT}.includes('Record makes')", PATIENCE_S)
     tops = {name: top for name, top in page.evaluate(TABS) if name in CONTROLS}
     assert tops.keys() == set(CONTROLS)

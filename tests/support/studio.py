@@ -36,6 +36,8 @@ T_CLUSTER_WRIST = np.concatenate([[0.02, 0.03, -0.01], quat_exp(np.array([0.4, -
 BOX = np.array([0.05, 0.1, 0.05, 0.0, 0.0, 0.0, 1.0])
 DISABLED = "[...document.querySelectorAll('button')].find(one => one.textContent.trim() === '%s').disabled"
 FOLLOWING = DISABLED % "Follow the hands"
+OPENED = """[...document.querySelectorAll('[role=tab]')].some(
+  one => one.textContent.trim() === '%s' && one.getAttribute('aria-selected') === 'true')"""
 SECOND = """(() => {
   const label = [...document.querySelectorAll('label')].find(one => one.textContent === 'Time, s');
   let row = label;
@@ -78,6 +80,12 @@ class Studio:
             assert time.monotonic() < give_up_s, "it never came to this"
         return message
 
+    def settle(self) -> None:
+        """Let the server's clock go on a little. A browser sends what is typed slightly later than clicks."""
+        end_s = self.server.ask({"op": "status"})["uptime_s"] + 0.3
+        while self.server.ask({"op": "status"})["uptime_s"] < end_s:
+            pass
+
     def box(self) -> dict[str, Any]:
         """What the body Box carries, as the server says."""
         give_up_s = time.monotonic() + PATIENCE_S
@@ -102,6 +110,15 @@ class Studio:
                 tip = columns.argmax()
                 return left + columns[tip] - 8.0, float(top + rows[tip])
             assert time.monotonic() < give_up_s, "no arrow is drawn"
+
+    def open(self, tab: str) -> None:
+        """Open a tab of the panel, clicking again if the panel was moving under the mouse."""
+        opened, give_up_s = OPENED % tab, time.monotonic() + PATIENCE_S
+        while not self.page.evaluate(opened):
+            assert time.monotonic() < give_up_s, f"the tab {tab} does not open"
+            self.page.click(tab, PATIENCE_S)
+            with contextlib.suppress(AssertionError):
+                self.page.wait_for(opened, 1.0)
 
     def disabled(self, button: str) -> bool:
         """Whether a button cannot be clicked."""
