@@ -116,6 +116,6 @@ def test_the_simulator_has_the_hand_that_the_kinematics_have():
     mujoco.mj_kinematics(model, data)
     positions, rotations = forward_kinematics(hand, angles)
     for bone in range(hand.bone_count):
-        body = data.body("wrist" if bone == 0 else hand.joint_names[bone])
+        body = data.body("wrist 0" if bone == 0 else f"{hand.joint_names[bone]} 0")
         assert np.allclose(body.xpos, positions[bone], atol=1e-9)
         assert np.allclose(body.xmat.reshape(3, 3), rotations[bone], atol=1e-9)
