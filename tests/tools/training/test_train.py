@@ -198,10 +198,12 @@ def test_hands_of_other_proportions_and_frames_are_learned_together(hands):
     assert model.hand is HAND
     sampler = RoundSampler([hands[0], free], TINY, 1.0)
     used = sampler._parts[1].hands[0].hand
-    angles = np.random.default_rng(0).uniform(*other.limits.T, (20, other.angle_count))
+    low, high = other.limits.T
+    angles = np.random.default_rng(0).uniform(low, high, (20, other.angle_count))
     np.testing.assert_allclose(forward_kinematics(used, angles)[0], forward_kinematics(other, angles)[0], atol=1e-9)
     rest = np.concatenate([captured.angles[FUTURE_FRAMES:-FUTURE_FRAMES:4] for captured in hands[0].hands]).mean(axis=0)
-    np.testing.assert_allclose(*(forward_kinematics(hand, rest)[1] for hand in (used, HAND)), atol=1e-9)
+    ours, theirs = (forward_kinematics(hand, rest)[1] for hand in (used, HAND))
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
     samples = sampler.next_round(model.model)
     assert np.isfinite(samples.inputs).all()
     assert np.isfinite(samples.outputs).all()

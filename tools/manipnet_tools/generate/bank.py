@@ -79,10 +79,10 @@ def fill_bank(tables: Tables, pinches: tuple[Pinches, Pinches], made: MadeShape,
     kinds = kinds_for(made.sites, float(np.ptp(made.mesh.vertices, axis=0).min()))
     sides = _sides(made, shape)
     if kinds == ("press",):
-        pressing = [_candidates(tables, pinches, seen, kinds, bank, rng, 2 * WANTED) for seen in sides]
+        right, left = (_candidates(tables, pinches, seen, kinds, bank, rng, 2 * WANTED) for seen in sides)
         both = TwoHands(tables, shape, (sides[0].space, sides[1].space), made.pieces)
         held: list[Held] = []
-        for number, pair in enumerate(both.pairs(*pressing, WANTED // 2, bank.refused)):
+        for number, pair in enumerate(both.pairs(right, left, WANTED // 2, bank.refused)):
             bank.verified["press"] += 2
             held += [_held(tables, seen, grasp, number) for seen, grasp in zip(sides, pair, strict=True)]
         return replace(bank, grasps=tuple(held))
