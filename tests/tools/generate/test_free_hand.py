@@ -13,10 +13,10 @@ from manipnet.synthesis.hand.validation import check_hand
 from manipnet.synthesis.model.layout import layout_of
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.assets.makehuman import Assets, MakeHumanError
-from manipnet_tools.generate.bone_frames import in_frames_of
 from manipnet_tools.generate.free_hand import FREE_HAND, free_hand
 from manipnet_tools.generate.hand_mesh import default_adult
 from manipnet_tools.generate.proportions import HANDS, Proportions, drawn_proportions, proportioned
+from manipnet_tools.takes.bone_frames import in_frames_of
 
 pytestmark = pytest.mark.quick
 

@@ -25,7 +25,7 @@ from manipnet_tools.evaluation.results import (
     Row,
     row_name,
 )
-from manipnet_tools.generate.bone_frames import in_frames_of, same_joints
+from manipnet_tools.takes.bone_frames import in_frames_of, same_joints
 from manipnet_tools.takes.rollout import roll_out
 
 Source = Callable[[Fold, Callable[[int], None]], list[Hands]]
