@@ -19,9 +19,10 @@ def test_a_model_of_another_hand_poses_the_captured_one():
     bundle, free = load_bundle(), free_hand()
     posed = posing(bundle, free)
     check_hand(posed.hand)
-    angles = np.random.default_rng(0).uniform(*free.limits.T, (20, free.angle_count))
-    joints = [forward_kinematics(hand, angles)[0] for hand in (posed.hand, free)]
-    np.testing.assert_allclose(*joints, atol=1e-9)
-    at_rest = [forward_kinematics(hand, bundle.rest_angles)[1] for hand in (posed.hand, bundle.hand)]
-    np.testing.assert_allclose(*at_rest, atol=1e-9)
+    low, high = free.limits.T
+    angles = np.random.default_rng(0).uniform(low, high, (20, free.angle_count))
+    ours, theirs = (forward_kinematics(hand, angles)[0] for hand in (posed.hand, free))
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
+    ours, theirs = (forward_kinematics(hand, bundle.rest_angles)[1] for hand in (posed.hand, bundle.hand))
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
     assert ((posed.limits[:, 0] <= posed.rest_angles) & (posed.rest_angles <= posed.limits[:, 1])).all()

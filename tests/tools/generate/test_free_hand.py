@@ -13,10 +13,10 @@ from manipnet.synthesis.hand.validation import check_hand
 from manipnet.synthesis.model.layout import layout_of
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet_tools.assets.makehuman import Assets, MakeHumanError
-from manipnet_tools.generate.bone_frames import in_frames_of
 from manipnet_tools.generate.free_hand import FREE_HAND, free_hand
 from manipnet_tools.generate.hand_mesh import default_adult
 from manipnet_tools.generate.proportions import HANDS, Proportions, drawn_proportions, proportioned
+from manipnet_tools.takes.bone_frames import in_frames_of
 
 pytestmark = pytest.mark.quick
 
@@ -116,6 +116,6 @@ def test_the_simulator_has_the_hand_that_the_kinematics_have():
     mujoco.mj_kinematics(model, data)
     positions, rotations = forward_kinematics(hand, angles)
     for bone in range(hand.bone_count):
-        body = data.body("wrist" if bone == 0 else hand.joint_names[bone])
+        body = data.body("wrist 0" if bone == 0 else f"{hand.joint_names[bone]} 0")
         assert np.allclose(body.xpos, positions[bone], atol=1e-9)
         assert np.allclose(body.xmat.reshape(3, 3), rotations[bone], atol=1e-9)

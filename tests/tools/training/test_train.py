@@ -28,7 +28,7 @@ from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, TakeSet
 from manipnet_tools.training.model import hidden_columns
 from manipnet_tools.training.options import QuantiseOptions
-from manipnet_tools.training.sampler import FUTURE_FRAMES, RoundSampler, main_hand
+from manipnet_tools.training.sampler import FUTURE_FRAMES, Posed, RoundSampler, main_hand
 from manipnet_tools.training.start import read_start
 from manipnet_tools.training.train import Trainer, new_model, train
 from manipnet_tools.training.trained import save_bundle
@@ -198,10 +198,12 @@ def test_hands_of_other_proportions_and_frames_are_learned_together(hands):
     assert model.hand is HAND
     sampler = RoundSampler([hands[0], free], TINY, 1.0)
     used = sampler._parts[1].hands[0].hand
-    angles = np.random.default_rng(0).uniform(*other.limits.T, (20, other.angle_count))
+    low, high = other.limits.T
+    angles = np.random.default_rng(0).uniform(low, high, (20, other.angle_count))
     np.testing.assert_allclose(forward_kinematics(used, angles)[0], forward_kinematics(other, angles)[0], atol=1e-9)
     rest = np.concatenate([captured.angles[FUTURE_FRAMES:-FUTURE_FRAMES:4] for captured in hands[0].hands]).mean(axis=0)
-    np.testing.assert_allclose(*(forward_kinematics(hand, rest)[1] for hand in (used, HAND)), atol=1e-9)
+    ours, theirs = (forward_kinematics(hand, rest)[1] for hand in (used, HAND))
+    np.testing.assert_allclose(ours, theirs, atol=1e-9)
     samples = sampler.next_round(model.model)
     assert np.isfinite(samples.inputs).all()
     assert np.isfinite(samples.outputs).all()
@@ -236,3 +238,11 @@ def test_short_takes_are_left_out_and_need_no_roll_outs(hands):
 def test_numbers_with_which_nothing_can_be_trained_are_named(change, reason):
     with pytest.raises(ConfigError, match=reason):
         replace(TrainConfig(), **change).check()
+
+
+def test_going_on_with_the_same_hand_keeps_the_frames_of_its_bones(hands):
+    """Also where the takes differ, so that the mean pose is another one."""
+    other = [replace(captured, angles=captured.angles + 0.1) for captured in hands[0].hands]
+    sampler = RoundSampler([TakeSet(other), hands[0]], TINY, 1.0, Posed(HAND, HAND.limits.mean(axis=1)))
+    assert sampler.hand is HAND
+    assert all(captured.hand is HAND for part in sampler._parts for captured in part.hands)

@@ -4,12 +4,9 @@ from collections.abc import Callable, Collection, Container, Sequence
 from dataclasses import replace
 from itertools import groupby
 
-import numpy as np
 from rich.progress import Progress
 
-from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
-from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.synthesizer import Synthesizer
 from manipnet_tools.evaluation import baselines
@@ -28,7 +25,7 @@ from manipnet_tools.evaluation.results import (
     Row,
     row_name,
 )
-from manipnet_tools.generate.bone_frames import in_frames_of
+from manipnet_tools.takes.bone_frames import in_frames_of, same_joints
 from manipnet_tools.takes.rollout import roll_out
 
 Source = Callable[[Fold, Callable[[int], None]], list[Hands]]
@@ -111,17 +108,12 @@ def posing(bundle: Bundle, hand: Hand) -> Bundle:
     Hands are compared in their relaxed poses. That of the dataset's subject is known from the shipped bundle; a
     generated hand has the angles of its model.
     """
-    if np.allclose(_flat(hand), _flat(bundle.hand), atol=1e-6):
+    if same_joints(hand, bundle.hand):
         return bundle
     own, subject = bundle.rest_angles, load_bundle()
-    rest = subject.rest_angles if np.allclose(_flat(hand), _flat(subject.hand), atol=1e-6) else own
+    rest = subject.rest_angles if same_joints(hand, subject.hand) else own
     shifted = bundle.limits + (rest - own)[:, None]
     return replace(bundle, hand=in_frames_of(hand, bundle.hand, rest, own), rest_angles=rest, limits=shifted)
-
-
-def _flat(hand: Hand) -> Array:
-    """Joints `(J, 3)` of the hand when all angles are zero."""
-    return forward_kinematics(hand, np.zeros(hand.angle_count))[0]
 
 
 def synthesise(

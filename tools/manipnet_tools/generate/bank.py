@@ -2,23 +2,25 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.random import Generator
 
-from manipnet.geometry import SIDES, Array, Side, matrix_to_quat, mirror_points, mirror_poses, transform
+from manipnet.geometry import Array, Side, mirror_points, mirror_poses, transform
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.objects.shape import Shape
 from manipnet_tools.generate.approaches import approach
-from manipnet_tools.generate.contact import mirrored_space, space_around
+from manipnet_tools.generate.contact import Space, mirrored_space, space_around
 from manipnet_tools.generate.finger_tables import Tables
-from manipnet_tools.generate.grasps import find_grasp
-from manipnet_tools.generate.mirrored import Mirrored, mirrored_corners, mirrored_sites
+from manipnet_tools.generate.grasps import Grasp, find_grasp
+from manipnet_tools.generate.mirrored import Mirrored, Surface, mirrored_corners, mirrored_sites
 from manipnet_tools.generate.proposals import Pinches, kinds_for, propose
 from manipnet_tools.generate.shapes import MadeShape
-from manipnet_tools.generate.simulate import Shaker
+from manipnet_tools.generate.simulate import Shaker, pose_of
+from manipnet_tools.generate.solids import Site
+from manipnet_tools.generate.two_hands import DOWNS, TwoHands
 
 WANTED: Final = 12
 """Grasps for each hand."""
@@ -43,6 +45,8 @@ class Held:
     """`(J, 3)`"""
     touching: int
     """How many capsules touch."""
+    pair: int = -1
+    """Two hands that hold only together have the same number, others -1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,50 +60,102 @@ class Bank:
     refused: Counter[str]
 
 
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """The object as one hand sees it: a left hand sees its mirror image."""
+
+    side: Side
+    surface: Surface
+    space: Space
+    corners: Array
+    """`(F, 3, 3)` triangles."""
+    sites: tuple[Site, ...]
+    pieces: tuple[Array, ...]
+
+
 def fill_bank(tables: Tables, pinches: tuple[Pinches, Pinches], made: MadeShape, shape: Shape, rng: Generator) -> Bank:
-    """Grasps of one object by both hands."""
+    """Grasps of one object by both hands, each alone or, where it is too wide for one, together."""
     bank = Bank((), Counter(), Counter(), Counter(), Counter())
-    space = space_around(shape)
-    corners = made.mesh.vertices[made.mesh.faces]
-    grasps: list[Held] = []
-    for side in SIDES:
-        if side == "right":
-            surface, around, triangles, sites, pieces = shape, space, corners, made.sites, made.pieces
-        else:
-            surface, around = Mirrored(shape), mirrored_space(space)
-            triangles, sites = mirrored_corners(corners), mirrored_sites(made.sites)
-            pieces = tuple(mirror_points(piece) for piece in made.pieces)
-        shaker = Shaker(tables, surface, pieces)
-        kinds, mine = kinds_for(made.sites), Counter[str]()
-        for turn in range(MOST_TRIES):
-            if mine.total() >= WANTED:
-                break
-            proposal = propose(tables, pinches, surface, triangles, sites, kinds, rng)
-            if proposal is None:
-                continue
-            if mine[proposal.kind] >= _ALIKE * WANTED and turn < MOST_TRIES // 2:
-                continue
-            bank.tried[proposal.kind] += 1
-            grasp = find_grasp(tables, around, proposal, surface.center_of_mass, bank.refused)
-            if grasp is None:
-                continue
-            bank.found[grasp.kind] += 1
-            if not shaker.holds(around, grasp):
+    kinds = kinds_for(made.sites, float(np.ptp(made.mesh.vertices, axis=0).min()))
+    sides = _sides(made, shape)
+    if kinds == ("press",):
+        right, left = (_candidates(tables, pinches, seen, kinds, bank, rng, 2 * WANTED) for seen in sides)
+        both = TwoHands(tables, shape, (sides[0].space, sides[1].space), made.pieces)
+        held: list[Held] = []
+        for number, pair in enumerate(both.pairs(right, left, WANTED // 2, bank.refused)):
+            bank.verified["press"] += 2
+            held += [_held(tables, seen, grasp, number) for seen, grasp in zip(sides, pair, strict=True)]
+        return replace(bank, grasps=tuple(held))
+    alone = [
+        _held(tables, seen, grasp, -1)
+        for seen in sides
+        for grasp in _candidates(
+            tables, pinches, seen, kinds, bank, rng, WANTED, Shaker(tables, seen.surface, seen.pieces)
+        )
+    ]
+    return replace(bank, grasps=tuple(alone))
+
+
+def _sides(made: MadeShape, shape: Shape) -> tuple[_Side, _Side]:
+    space, corners = space_around(shape), made.mesh.vertices[made.mesh.faces]
+    pieces = tuple(mirror_points(piece) for piece in made.pieces)
+    return (
+        _Side("right", shape, space, corners, made.sites, made.pieces),
+        _Side(
+            "left",
+            Mirrored(shape),
+            mirrored_space(space),
+            mirrored_corners(corners),
+            mirrored_sites(made.sites),
+            pieces,
+        ),
+    )
+
+
+def _candidates(
+    tables: Tables,
+    pinches: tuple[Pinches, Pinches],
+    seen: _Side,
+    kinds: Sequence[str],
+    bank: Bank,
+    rng: Generator,
+    wanted: int,
+    shaker: Shaker | None = None,
+) -> list[Grasp]:
+    """Grasps of one hand, which the `shaker` has verified if there is one."""
+    found, mine = [], Counter[str]()
+    for turn in range(MOST_TRIES):
+        if len(found) >= wanted:
+            break
+        proposal = propose(tables, pinches, seen.surface, seen.corners, seen.sites, kinds, rng)
+        if proposal is None:
+            continue
+        if len(set(kinds)) > 1 and mine[proposal.kind] >= _ALIKE * wanted and turn < MOST_TRIES // 2:
+            continue
+        bank.tried[proposal.kind] += 1
+        grasp = find_grasp(tables, seen.space, proposal, seen.surface.center_of_mass, bank.refused)
+        if grasp is None:
+            continue
+        bank.found[grasp.kind] += 1
+        if shaker is not None:
+            if not shaker.holds(seen.space, grasp):
                 bank.refused["falls in the simulator"] += 1
                 continue
             bank.verified[grasp.kind] += 1
-            mine[grasp.kind] += 1
-            opened, back = approach(tables, around, grasp)
-            pose = np.concatenate([grasp.place, matrix_to_quat(grasp.turn)])
-            joints = transform(pose, forward_kinematics(tables.hand, grasp.angles)[0])
-            downs = grasp.downs
-            if side == "left":
-                pose, joints = mirror_poses(pose), mirror_points(joints)
-                back, downs = mirror_points(back), mirror_points(downs)
-            grasps.append(
-                Held(side, grasp.kind, pose, grasp.angles, opened, back, downs, joints, int(grasp.touching.sum()))
-            )
-    return Bank(tuple(grasps), bank.tried, bank.found, bank.verified, bank.refused)
+        mine[grasp.kind] += 1
+        found.append(grasp)
+    return found
+
+
+def _held(tables: Tables, seen: _Side, grasp: Grasp, pair: int) -> Held:
+    """The grasp in the object's own frame, with the way to it."""
+    opened, back = approach(tables, seen.space, grasp)
+    pose, downs = pose_of(grasp), grasp.downs if pair < 0 else DOWNS
+    joints = transform(pose, forward_kinematics(tables.hand, grasp.angles)[0])
+    if seen.side == "left":
+        pose, joints, back = mirror_poses(pose), mirror_points(joints), mirror_points(back)
+        downs = downs if pair >= 0 else mirror_points(downs)
+    return Held(seen.side, grasp.kind, pose, grasp.angles, opened, back, downs, joints, int(grasp.touching.sum()), pair)
 
 
 def apart(first: Held, second: Held, least_m: float) -> bool:

@@ -24,6 +24,8 @@ WIDTH_STEP_M: Final = 0.005
 WIDEST_PINCH_M: Final = 0.085
 FACING: Final = 0.75
 """Cosine between a pad and the line to the other one."""
+WIDEST_HELD_M: Final = 0.13
+"""One hand does not reach around what is wider everywhere."""
 CONE_RAD: Final = np.radians(30.0)
 _SPARED: Final = (0.45, 0.2, 0.35)
 """How often no finger, the little finger, or the last two stay away: people hold small bodies with fewer."""
@@ -45,7 +47,8 @@ class Proposal:
     needed: tuple[int, ...]
     along: Array
     downs: Array
-    """`(n, 3)` the directions of gravity in which it has to hold: all, or about one for a hook or a flat hand."""
+    """`(n, 3)` the directions of gravity in which it has to hold: all, about one for a hook or a flat hand, or none for
+    a hand that holds only together with another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +106,8 @@ def propose(
     edges = [site for site in sites if site.kind in ("rim", "knob", "stick")]
     if kind in ("bar", "hook"):
         return _around(tables, _drawn(bars, rng), kind, rng) if bars else None
+    if kind == "press":
+        return _pressed(tables, shape, corners, rng)
     if kind in ("pinch", "tripod", "lateral"):
         if edges and rng.random() < (1.0 if kind == "lateral" else 0.7):
             held = _edge(_drawn(edges, rng), rng)
@@ -112,8 +117,13 @@ def propose(
     return _on_surface(tables, corners, kind, rng)
 
 
-def kinds_for(sites: Sequence[Site]) -> tuple[str, ...]:
-    """Types of grasps worth trying, those that are tried more often more than once."""
+def kinds_for(sites: Sequence[Site], narrowest_m: float) -> tuple[str, ...]:
+    """Types of grasps worth trying, those that are tried more often more than once.
+
+    What is `narrowest_m` wide at its narrowest is pressed between two hands if it is too wide for one.
+    """
+    if narrowest_m > WIDEST_HELD_M:
+        return ("press",)
     held = {site.kind for site in sites}
     kinds: list[str] = ["palm", "palm", "palm", "above", "above", "pinch", "pinch", "tripod", "tripod", "flat"]
     if "bar" in held:
@@ -219,6 +229,28 @@ def cone(down: Array) -> Array:
     v = np.cross(down, u)
     aside = np.sin(CONE_RAD) * np.array([u, -u, v, -v])
     return np.concatenate([down[None], np.cos(CONE_RAD) * down + aside])
+
+
+def _pressed(tables: Tables, shape: Surface, corners: Array, rng: Generator) -> Proposal | None:
+    """A flat hand against a side of the object, with fingers forward and down; another hand presses against it."""
+    aside = rng.uniform(0.0, 2.0 * np.pi)
+    out = np.array([np.cos(aside), 0.0, np.sin(aside)])
+    start = shape.center_of_mass + 0.6 * out + rng.normal(0.0, [0.03, 0.02, 0.03])
+    reach = float(shape.trace(start[None], -out[None])[0])
+    if not reach < 0.6:
+        return None
+    point = start - reach * out
+    normal = shape.signed_distance(point[None])[1][0]
+    if normal @ out < 0.9:
+        return None
+    fingers = _rotated(np.array([0.0, -1.0, 0.0]), normal, rng.uniform(-2.2, 2.2))
+    frame = _frames(normal[None] + 0.05 * rng.normal(size=3), fingers[None])[0]
+    x, z = frame[:, 1], frame[:, 0]
+    turn = np.stack([x, np.cross(z, x), z], axis=1)
+    off = tables.hand.radii[1] + rng.uniform(0.0, 0.004)
+    at = np.array([rng.uniform(0.07, 0.11), rng.uniform(-0.015, 0.015), tables.hand.offsets[8, 2] - off])
+    wanted = np.array([_FLAT] * 5)
+    return Proposal("press", turn, point - turn @ at, wanted, (1, 2), -z, np.empty((0, 3)))
 
 
 def _edge(site: Site, rng: Generator) -> tuple[Array, Array, Array, float]:

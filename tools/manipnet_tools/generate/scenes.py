@@ -66,7 +66,7 @@ class Director:
         rng = self._rng
         grasp = self._reachable(sides[0]) or self._reachable(sides[1])
         if grasp is None:
-            return now
+            return self._press(now)
         contact = now + rng.uniform(0.6, 1.2)
         release = contact + rng.uniform(2.0, 6.0)
         self._carry(contact + rng.uniform(0.03, 0.2), release - rng.uniform(0.05, 0.15), [grasp], lands=True)
@@ -97,6 +97,22 @@ class Director:
         self._carry(contact + lag + 0.1, release - 0.1, [first, second], lands=True)
         done = self._hold("together", first, now, contact, release)
         return max(done, self._hold("together", second, now + lag, contact + lag, release - rng.uniform(0.0, 0.3)))
+
+    def _press(self, now: float) -> float:
+        """Both hands at once on an object that is too wide for one."""
+        rng = self._rng
+        pairs = [(one, self._partner(one)) for one in self._grasps if one.pair >= 0 and one.side == "right"]
+        if not pairs:
+            return now
+        drawn = [pairs[int(k)] for k in rng.choice(len(pairs), min(3, len(pairs)), replace=False)]
+        pair = max(drawn, key=lambda both: sum(self._ease(grasp, self._pose[3:]) for grasp in both))
+        contact = now + rng.uniform(0.7, 1.2)
+        release = contact + rng.uniform(2.0, 6.0)
+        self._carry(contact + rng.uniform(0.1, 0.25), release - rng.uniform(0.05, 0.15), pair, lands=True)
+        return max(self._hold("together", grasp, now, contact, release) for grasp in pair)
+
+    def _partner(self, grasp: Held) -> Held:
+        return next(other for other in self._grasps if other.pair == grasp.pair and other.side != grasp.side)
 
     def _near(self, now: float, sides: list[Side]) -> float:
         rng = self._rng
@@ -135,7 +151,7 @@ class Director:
 
     def _reachable(self, side: Side) -> Held | None:
         """A grasp of the object as it is now, with the forearm on the person's side and above the table."""
-        own = of_side(self._grasps, side)
+        own = [grasp for grasp in of_side(self._grasps, side) if grasp.pair < 0]
         if not own:
             return None
         best, best_value = None, -np.inf

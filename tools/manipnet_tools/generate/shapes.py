@@ -1,6 +1,7 @@
 """Objects to be held, made by rule and chance: each number and seed gives one, always the same.
 
-Sizes follow everyday things whose grips are 2 to 12 cm wide. None is taken from a scanned or captured object.
+Sizes follow everyday things whose grips are 2 to 12 cm wide, and boxes and balls for two hands. None is taken from a
+scanned or captured object.
 """
 
 from collections.abc import Callable
@@ -14,8 +15,10 @@ from manipnet.geometry import Array
 from manipnet.synthesis.objects.mesh import ClosedMesh, closed_mesh
 from manipnet_tools.generate.placing import rotated, shifted
 from manipnet_tools.generate.simple_shapes import (
+    ball,
     block,
     bottle,
+    crate,
     goblet,
     letter,
     lid,
@@ -86,6 +89,6 @@ KINDS: Final[dict[str, tuple[float, Callable[[Generator], Solid]]]] = {
     "tool": (7, tool), "lid": (5, lid), "goblet": (5, goblet), "cup": (6, cup), "bowl": (4, bowl),
     "bottle": (6, bottle), "vase": (5, vase), "rod": (4, rod), "plate": (4, plate), "torus": (3, torus),
     "box": (4, block), "prism": (3, prism), "superquadric": (4, superquadric), "letter": (3, letter),
-    "pair": (3, _pair),
+    "pair": (3, _pair), "crate": (3, crate), "ball": (3, ball),
 }  # fmt: skip
 """Kinds of shapes, how often each is made, and how."""

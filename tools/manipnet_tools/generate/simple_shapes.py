@@ -22,6 +22,18 @@ def block(rng: Generator) -> Solid:
     return box(size)
 
 
+def crate(rng: Generator) -> Solid:
+    """A box for two hands."""
+    return box(rng.uniform([150, 140, 150], [260, 240, 260]))
+
+
+def ball(rng: Generator) -> Solid:
+    """A ball or an egg for two hands."""
+    mesh = trimesh.creation.icosphere(4, 1.0)
+    mesh.vertices *= rng.uniform(75, 130) * rng.uniform(0.9, 1.1, 3)
+    return Solid(mesh, (np.asarray(trimesh.convex.convex_hull(mesh.vertices).vertices),))
+
+
 def prism(rng: Generator) -> Solid:
     corners = rng.uniform(18, 42) * turns(int(rng.integers(3, 8))) * rng.uniform(0.6, 1.0, 2)
     half = 0.5 * rng.uniform(35, 150)

@@ -6,10 +6,12 @@ frame, SI units. It needs the extra `generate`.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from manipnet.geometry import Array, matrix_to_quat, quat_conjugate, quat_rotate
 from manipnet.synthesis.hand.hand import Hand
@@ -34,24 +36,36 @@ SETTLED_M: Final = 0.02
 _HAND_BIT, _OBJECT_BIT = 1, 2
 
 
-class Shaker:
-    """Tries grasps of one object by one hand."""
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """One hand in the simulator: the pose of its wrist `(7,)` in the object's frame, its angles `(A,)`, and how far
+    each servo aims beyond them `(A,)`."""
 
-    def __init__(self, tables: Tables, shape: Surface, pieces: Sequence[Array]) -> None:
-        self._tables = tables
+    pose: Array
+    angles: Array
+    aims: Array
+
+
+class Simulation:
+    """One object with some hands."""
+
+    def __init__(self, hands: Sequence[Hand], shape: Surface, pieces: Sequence[Array]) -> None:
         self._shape = shape
-        self._model = _model(tables.hand, shape, pieces)
+        self._model = _model(hands, shape, pieces)
         self._data = mujoco.MjData(self._model)
+        self._wrists = [self._model.body(_name(k, "wrist")).id for k in range(len(hands))]
 
-    def holds(self, space: Space, grasp: Grasp) -> bool:
-        """Whether the grasp holds the object while gravity takes each of its directions."""
+    def holds(self, hands: Sequence[Placed], downs: Array) -> bool:
+        """Whether the hands hold the object while gravity takes each of the directions `downs (n, 3)`."""
         model, data = self._model, self._data
         mujoco.mj_resetData(model, data)
-        model.body_pos[1], model.body_quat[1] = grasp.place, matrix_to_quat(grasp.turn)[[3, 0, 1, 2]]
-        data.qpos[: len(grasp.angles)] = grasp.angles
-        data.ctrl[:] = grasp.angles + self._offsets(space, grasp)
+        for wrist, hand in zip(self._wrists, hands, strict=True):
+            model.body_pos[wrist], model.body_quat[wrist] = hand.pose[:3], hand.pose[[6, 3, 4, 5]]
+        angles = np.concatenate([hand.angles for hand in hands])
+        data.qpos[: len(angles)] = angles
+        data.ctrl[:] = angles + np.concatenate([hand.aims for hand in hands])
         model.opt.gravity[:] = 0.0
-        free = slice(len(grasp.angles), len(grasp.angles) + 6)
+        free = slice(len(angles), len(angles) + 6)
         model.dof_damping[free] = 100.0 * OBJECT_KG * np.r_[1.0, 1.0, 1.0, self._shape.inertia.diagonal()]
         start = data.qpos[-7:].copy()
         mujoco.mj_step(model, data, round(SETTLE_S / STEP_S))
@@ -59,34 +73,13 @@ class Shaker:
             return False
         model.dof_damping[free] = 0.0
         settled = data.qpos[-7:].copy()
-        for down in grasp.downs:
+        for down in downs:
             model.opt.gravity[:] = GRAVITY_M_S2 * down
             mujoco.mj_step(model, data, round(SHAKE_S / STEP_S))
             moved, turned = self._moved(settled, data.qpos[-7:])
             if not (moved < MOVED_M and turned < TURNED_RAD):
                 return False
         return True
-
-    def _offsets(self, space: Space, grasp: Grasp) -> Array:
-        """How far each servo aims beyond the pose `(A,)`: torques of the joints over the servos' stiffness."""
-        hand = self._tables.hand
-        gaps, points, normals, _ = look(space, self._tables.body, grasp.angles, grasp.turn, grasp.place)
-        at = np.flatnonzero(gaps < TOUCH_M)
-        forces = squeeze(points[at], normals[at], self._shape.center_of_mass, SQUEEZE_N)
-        positions, rotations = forward_kinematics(hand, grasp.angles)
-        torques = np.zeros(len(grasp.angles))
-        for capsule, point, force in zip(at.tolist(), points[at], forces, strict=True):
-            if capsule < 4:
-                continue
-            finger = (capsule - 4) // 3
-            local, push = grasp.turn.T @ (point - grasp.place), grasp.turn.T @ force
-            for a in range(4 * finger, 4 * finger + 4):
-                bone = int(hand.angle_bones[a])
-                if bone > hand.capsules[capsule, 0]:
-                    continue
-                axis = rotations[hand.parents[bone]] @ hand.axes[a]
-                torques[a] += axis @ np.cross(local - positions[bone], push)
-        return np.clip(torques, -MOST_TORQUE_NM, MOST_TORQUE_NM) / SERVO_NM_RAD
 
     def _moved(self, before: Array, after: Array) -> tuple[float, float]:
         """How far the centre of mass moved, and how far the object turned."""
@@ -98,16 +91,62 @@ class Shaker:
         return float(np.linalg.norm(centre[1] - centre[0])), turned
 
 
+class Shaker:
+    """Tries grasps of one object by one hand."""
+
+    def __init__(self, tables: Tables, shape: Surface, pieces: Sequence[Array]) -> None:
+        self._tables, self._shape = tables, shape
+        self._simulation = Simulation([tables.hand], shape, pieces)
+
+    def holds(self, space: Space, grasp: Grasp) -> bool:
+        """Whether the grasp holds the object while gravity takes each of its directions."""
+        at, points, normals = contacts(self._tables, space, grasp)
+        forces = squeeze(points, normals, self._shape.center_of_mass, SQUEEZE_N)
+        aims = aims_of(self._tables.hand, grasp, at, points, forces)
+        return self._simulation.holds([Placed(pose_of(grasp), grasp.angles, aims)], grasp.downs)
+
+
+def pose_of(grasp: Grasp) -> Array:
+    """The wrist `(7,)` in the object's frame."""
+    return np.concatenate([grasp.place, matrix_to_quat(grasp.turn)])
+
+
+def contacts(tables: Tables, space: Space, grasp: Grasp) -> tuple[NDArray[np.intp], Array, Array]:
+    """The capsules that touch `(n,)`, with the points on their axes and the object's normals there, `(n, 3)`."""
+    gaps, points, normals, _ = look(space, tables.body, grasp.angles, grasp.turn, grasp.place)
+    at = np.flatnonzero(gaps < TOUCH_M)
+    return at, points[at], normals[at]
+
+
+def aims_of(hand: Hand, grasp: Grasp, capsules: NDArray[np.intp], points: Array, forces: Array) -> Array:
+    """How far each servo aims beyond the pose `(A,)` to press with `forces (n, 3)`: torque over stiffness."""
+    positions, rotations = forward_kinematics(hand, grasp.angles)
+    torques = np.zeros(len(grasp.angles))
+    for capsule, point, force in zip(capsules.tolist(), points, forces, strict=True):
+        if capsule < 4:
+            continue
+        finger = (capsule - 4) // 3
+        local, push = grasp.turn.T @ (point - grasp.place), grasp.turn.T @ force
+        for a in range(4 * finger, 4 * finger + 4):
+            bone = int(hand.angle_bones[a])
+            if bone > hand.capsules[capsule, 0]:
+                continue
+            axis = rotations[hand.parents[bone]] @ hand.axes[a]
+            torques[a] += axis @ np.cross(local - positions[bone], push)
+    return np.clip(torques, -MOST_TORQUE_NM, MOST_TORQUE_NM) / SERVO_NM_RAD
+
+
 def hand_model(hand: Hand) -> mujoco.MjModel:
     """The hand alone, for a look at its kinematics."""
     spec = _spec()
-    _add_hand(spec, hand)
+    _add_hand(spec, hand, 0)
     return spec.compile()
 
 
-def _model(hand: Hand, shape: Surface, pieces: Sequence[Array]) -> mujoco.MjModel:
+def _model(hands: Sequence[Hand], shape: Surface, pieces: Sequence[Array]) -> mujoco.MjModel:
     spec = _spec()
-    _add_hand(spec, hand)
+    for number, hand in enumerate(hands):
+        _add_hand(spec, hand, number)
     _add_object(spec, shape, pieces)
     return spec.compile()
 
@@ -125,11 +164,16 @@ def _spec() -> mujoco.MjSpec:
     return spec
 
 
-def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
-    bodies = {0: spec.worldbody.add_body(name="wrist", gravcomp=1.0)}
+def _name(number: int, part: str) -> str:
+    """The name of a part of one hand."""
+    return f"{part} {number}"
+
+
+def _add_hand(spec: mujoco.MjSpec, hand: Hand, number: int) -> None:
+    bodies = {0: spec.worldbody.add_body(name=_name(number, "wrist"), gravcomp=1.0)}
     for bone in range(1, hand.bone_count):
         bodies[bone] = bodies[int(hand.parents[bone])].add_body(
-            name=hand.joint_names[bone],
+            name=_name(number, hand.joint_names[bone]),
             pos=hand.offsets[bone],
             quat=hand.rest_quats[bone, [3, 0, 1, 2]],
             gravcomp=1.0,
@@ -139,7 +183,7 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
         )
         for a in np.flatnonzero(hand.angle_bones == bone):
             joint = bodies[bone].add_joint(
-                name=hand.angle_names[a],
+                name=_name(number, hand.angle_names[a]),
                 type=mujoco.mjtJoint.mjJNT_HINGE,
                 axis=quat_rotate(quat_conjugate(hand.rest_quats[bone]), hand.axes[a]),
                 range=hand.limits[a] + [-0.3, 0.3],
@@ -157,7 +201,8 @@ def _add_hand(spec: mujoco.MjSpec, hand: Hand) -> None:
             conaffinity=_OBJECT_BIT,
             mass=0.0,
         )
-    for name in hand.angle_names:
+    for angle in hand.angle_names:
+        name = _name(number, angle)
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.gainprm[0] = SERVO_NM_RAD
         servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE

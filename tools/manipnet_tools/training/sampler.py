@@ -8,7 +8,7 @@ import numpy as np
 
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
-from manipnet_tools.generate.bone_frames import in_frames_of
+from manipnet_tools.takes.bone_frames import in_frames_of
 from manipnet_tools.takes.dataset import DataError
 from manipnet_tools.training.augment import AnswerRule, captured_samples, on_policy_samples
 from manipnet_tools.training.config import TrainConfig

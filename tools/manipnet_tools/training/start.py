@@ -63,9 +63,8 @@ def _weights(bundle: Bundle) -> dict[str, np.ndarray]:
 
 
 def _network(bundle: Bundle, weights: dict[str, np.ndarray], config: TrainConfig) -> ManipNet:
-    columns = [np.zeros(bundle.layout.input_size, np.float32), np.ones(bundle.layout.input_size, np.float32)]
-    answers = [np.zeros(bundle.layout.output_size, np.float32), np.ones(bundle.layout.output_size, np.float32)]
-    norm = Normalisation(*columns, *answers, config.predict_change)  # replaced by the bundle's own
+    inputs, outputs = (np.ones(size, np.float32) for size in (bundle.layout.input_size, bundle.layout.output_size))
+    norm = Normalisation(inputs, inputs, outputs, outputs, config.predict_change)  # replaced by the bundle's own
     network = ManipNet(bundle.layout, norm, config.width, config.dropout, config.architecture, config.hidden)
     state = network.state_dict()
     network.load_state_dict({name: torch.from_numpy(weights[name].astype(np.float32)) for name in state})

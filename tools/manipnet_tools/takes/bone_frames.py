@@ -17,13 +17,14 @@ def in_frames_of(hand: Hand, other: Hand, angles: Array | None = None, other_ang
     """The hand with the frames that the bones of another hand of the same layout have.
 
     Frames are alike when this hand has the pose `angles (A,)` and the other one `other_angles (A,)`, by default zero.
-    Hands that rest differently, for example with leaning fingers, are compared in their relaxed poses. Joints, hinges,
-    skin and sensors stay where they are, and so do the angles of every pose. It is the same object if it has these
-    frames already.
+    Hands that rest differently, for example with leaning fingers, are compared in their relaxed poses; where `other` is
+    the same hand, both have the same pose. Joints, hinges, skin and sensors stay where they are, and so do the angles
+    of every pose. It is the same object if it has these frames already.
     """
     zero = np.zeros(hand.angle_count)
-    own = forward_kinematics(hand, zero if angles is None else angles)[1]
-    others = forward_kinematics(other, zero if other_angles is None else other_angles)[1]
+    other_angles = zero if other_angles is None else other_angles
+    angles = other_angles if same_joints(hand, other) else zero if angles is None else angles
+    own, others = forward_kinematics(hand, angles)[1], forward_kinematics(other, other_angles)[1]
     if np.allclose(own, others, rtol=0.0, atol=1e-9):
         return hand
     turns = np.swapaxes(own, 1, 2) @ others  # from each bone's new frame to its old one
@@ -42,6 +43,12 @@ def in_frames_of(hand: Hand, other: Hand, angles: Array | None = None, other_ang
             points=_into(turns[sensors.bones], sensors.points), normals=_into(turns[sensors.bones], sensors.normals)
         ),
     )
+
+
+def same_joints(hand: Hand, other: Hand) -> bool:
+    """Whether two hands have the same joints, whatever the frames of their bones."""
+    flat, others = (forward_kinematics(each, np.zeros(each.angle_count))[0] for each in (hand, other))
+    return bool(np.allclose(flat, others, rtol=0.0, atol=1e-6))
 
 
 def _into(turns: Array, vectors: Array) -> Array:
