@@ -167,6 +167,10 @@ def joint_beyond_the_end(avatar):
     avatar.document["skins"][0]["joints"][5] = 9999
 
 
+def unused_skin_without_joints(avatar):
+    avatar.document["skins"].append({"name": "empty"})
+
+
 def mirrored_as_a_whole(avatar):
     matrix = np.array(avatar.nodes[0]["matrix"]).reshape(4, 4).T
     avatar.nodes[0]["matrix"] = (FLIP @ matrix).T.ravel().tolist()
@@ -224,6 +228,7 @@ DAMAGED = {
     two_parents: "is in both.*export it again",
     child_beyond_the_end: "node 9999 in node .* is not there.*export it again",
     negative_joint: "negative number.*export it again",
+    unused_skin_without_joints: "damaged.*export it again",
     joint_beyond_the_end: "damaged.*export it again",
     mirrored_as_a_whole: "thumb of the left hand lies on the wrong side.*apply the negative scale",
     scale_of_zero: "no lengths at rest; export the rig with its rest pose",
@@ -281,6 +286,12 @@ def vrm_is_required(avatar):
     avatar.document["extensionsRequired"] = ["VRM"]
 
 
+def nameless_nodes_and_a_hand_of_unknown_name(avatar):
+    avatar.nodes.extend([{"name": "-"}, {"name": "_"}])
+    for side in ("Left", "Right"):
+        avatar.node(f"{side}Hand")["name"] = f"{side}Tatze"
+
+
 def long_chain_above(avatar):
     first, count = len(avatar.nodes), 3000
     avatar.nodes.extend({"children": [first + n + 1]} for n in range(count))
@@ -295,6 +306,7 @@ def long_chain_above(avatar):
         bone_inside_out,
         character_without_a_skin,
         vrm_is_required,
+        nameless_nodes_and_a_hand_of_unknown_name,
         long_chain_above,
     ],
     ids=lambda change: change.__name__,

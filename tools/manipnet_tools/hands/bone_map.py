@@ -32,7 +32,8 @@ def map_bones(skeleton: Skeleton, where: str) -> dict[Side, BoneMap]:
             continue
         found = {FINGERS[f][part + (f > 0)]: number[name] for (f, part), name in bones.fingers.items()}
         found |= {FINGERS[f][0]: number[name] for f, name in bones.metacarpals.items()}
-        _check_distinct(skeleton, [*bones.fingers.values(), *bones.metacarpals.values(), bones.hand or ""], where)
+        used = [*bones.fingers.values(), *bones.metacarpals.values(), *([bones.hand] if bones.hand else [])]
+        _check_distinct(skeleton, used, where)
         hand = number.get(bones.hand or "")
         hands[side] = found | {1: _common_parent(skeleton, found) if hand is None else hand}
     if not skeleton.names:
@@ -63,7 +64,7 @@ def read_map(path: Path, skeleton: Skeleton) -> dict[Side, BoneMap]:
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RigFileError(f"{path}: is not a JSON file ({error})") from None
     if isinstance(content, Mapping) and content and all(isinstance(bone, str) for bone in content.values()):
         return _read_names(path, content, skeleton)

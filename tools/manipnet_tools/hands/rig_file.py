@@ -1,5 +1,6 @@
 """Reads the skeleton of an avatar from a glTF Binary, VRM or BVH file."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,14 +76,12 @@ def read_skeleton(path: Path) -> Skeleton:
 def _from_glb(path: Path) -> Skeleton:
     data = path.read_bytes()
     rig = read_glb_rig(data)
-    skin, (document, binary) = (rig.vertices, rig.faces, rig.owners, rig.weights), glb_chunks(data)
-    skinned = {joint for skin in document.get("skins", []) for joint in skin["joints"]}
-    bare = {n for n, node in enumerate(document.get("nodes", [])) if "mesh" not in node}
-    names, ambiguous = _told_apart(rig.names, [set(rig.humanoid), skinned, bare])
-    return Skeleton(names, rig.parents, rig.positions, {}, *skin, True, (document, binary), ambiguous=ambiguous)
+    skin = rig.vertices, rig.faces, rig.owners, rig.weights
+    names, ambiguous = _told_apart(rig.names, [rig.humanoid, rig.joints, rig.bare])
+    return Skeleton(names, rig.parents, rig.positions, {}, *skin, True, glb_chunks(data), ambiguous=ambiguous)
 
 
-def _told_apart(names: list[str], likely: list[set[int]]) -> tuple[list[str], frozenset[str]]:
+def _told_apart(names: list[str], likely: Sequence[frozenset[int]]) -> tuple[list[str], frozenset[str]]:
     """The names of the bones, and the plain names that several of them share.
 
     Of nodes that share one, the only one in the first of the sets `likely` that has any is the bone, and the number of

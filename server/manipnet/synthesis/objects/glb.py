@@ -102,6 +102,10 @@ class GlbRig:
     """`(V, 4)` how much each of them moves it."""
     humanoid: frozenset[int]
     """The nodes that a VRM file maps to a humanoid."""
+    joints: frozenset[int]
+    """The nodes that move a skin."""
+    bare: frozenset[int]
+    """The nodes without a mesh."""
 
 
 def read_glb_rig(data: bytes) -> GlbRig:
@@ -193,7 +197,9 @@ class _Scene:
         parents = [self._parents.get(n, -1) for n in range(len(self._nodes))]
         points, corners = np.concatenate(vertices), np.concatenate(faces)
         skin = points, corners, np.concatenate(owners), np.concatenate(weights)
-        return GlbRig(names, parents, positions, *skin, frozenset(humanoid))
+        joints = frozenset(joint for each in self._document.get("skins", []) for joint in each["joints"])
+        bare = frozenset(n for n, node in enumerate(self._nodes) if "mesh" not in node)
+        return GlbRig(names, parents, positions, *skin, frozenset(humanoid), joints, bare)
 
     def _visible(self) -> list[int]:
         """The nodes of the scene in order, without those that are hidden."""
