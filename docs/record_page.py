@@ -1,8 +1,8 @@
-"""Record the moving pictures of the live page: `python docs/record_page.py [NAME …]` rewrites `docs/images/NAME.webp`.
+"""Record the pictures of the live page: `python docs/record_page.py [NAME …]` rewrites `docs/images/NAME.webp`.
 
 A real server plays its demo and records it. A headless Chromium then opens the recording on the page and steps through
 it picture by picture, so that the result runs at the true speed although the browser draws in software. It needs
-Chromium and the extra `dev`, and takes some ten minutes for all pictures.
+Chromium and the extra `dev`, and takes some minutes.
 """
 
 import base64
@@ -34,24 +34,24 @@ SHAPES = ("--mesh", "cylinder=bottle", "--mesh", "mug=wine_glass")
 
 @dataclass(frozen=True)
 class Clip:
-    """A part of the demo, played by a server with some options."""
+    """A part of the demo, played by a server with some options, or an instant of it."""
 
     options: tuple[str, ...]
     performed_s: tuple[float, float]
-    """Seconds after the start of the demo."""
+    """Seconds after the start of the demo; the same twice for an instant."""
     window: tuple[int, int] = (880, 440)
     shown: tuple[int, int] = (440, 352)
     whole: bool = False
     """Whether the panel is in the picture, and the camera follows; otherwise it is the stage, and the camera stands."""
-    rate_hz: float = 8.0
+    rate_hz: float = 6.0
 
 
 CLIPS = {
-    "page": Clip((), (28.0, 39.0), (1200, 600), (960, 480), whole=True, rate_hz=10.0),
-    "take-cube": Clip((), (5.0, 9.0)),
-    "take-cylinder": Clip((), (18.0, 22.0)),
-    "take-bottle": Clip(SHAPES, (18.0, 22.0)),
-    "take-glass": Clip(SHAPES, (31.5, 35.5)),
+    "page": Clip((), (29.0, 36.0), (1000, 500), (1000, 500), whole=True),
+    "take-cube": Clip((), (7.0, 7.0)),
+    "take-cylinder": Clip((), (20.0, 20.0)),
+    "take-bottle": Clip(SHAPES, (20.0, 20.0)),
+    "take-glass": Clip(SHAPES, (34.5, 34.5)),
 }
 
 
@@ -105,7 +105,7 @@ def pictures(page: Page, clip: Clip) -> Iterator[Image.Image]:
     if not clip.whole:
         page.drag((300.0, 200.0), (300.0, 200.5))  # takes the camera
     page.evaluate(DISMISS)
-    for k in range(round((last_s - first_s) * clip.rate_hz)):
+    for k in range(max(round((last_s - first_s) * clip.rate_hz), 1)):
         show(page, first_s + k / clip.rate_hz, 0.7)  # the browser draws once or twice in this time
         yield picture(page, clip)
 
