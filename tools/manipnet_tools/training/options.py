@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from manipnet.common.options import ConfigError
 from manipnet.synthesis.model.shipped import find_bundle, licence_of
@@ -10,7 +10,9 @@ from manipnet_tools.commands.arguments import Positional, arg
 from manipnet_tools.commands.checks import require_new_bundle
 from manipnet_tools.commands.options import WritingOptions
 from manipnet_tools.training.config import TrainConfig
-from manipnet_tools.training.mixture import DataFolder, data_folders, licence_of_mixture, require_free
+
+if TYPE_CHECKING:
+    from manipnet_tools.training.mixture import DataFolder
 
 
 @dataclass(frozen=True)
@@ -42,14 +44,20 @@ class TrainOptions(WritingOptions):
         self.training.check()
         licence = self.licence()
         if self.free:
+            from manipnet_tools.training.mixture import require_free
+
             require_free(licence)
 
-    def folders(self) -> tuple[DataFolder, ...]:
+    def folders(self) -> "tuple[DataFolder, ...]":
         """The folders of takes to train on. Raises `DataError`."""
+        from manipnet_tools.training.mixture import data_folders
+
         return data_folders(self.data, self.leave_out)
 
     def licence(self) -> str:
         """The terms of the model. Raises `DataError` and `BundleError`."""
+        from manipnet_tools.training.mixture import licence_of_mixture
+
         start = None if self.start is None else licence_of(find_bundle(self.start))
         return licence_of_mixture(self.folders(), start)
 
