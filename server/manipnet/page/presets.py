@@ -48,7 +48,7 @@ class Presets:
             raise ValueError(f"give the new preset a name of 1 to {LONGEST_NAME} characters")
         if name not in self._presets and len(self._presets) >= MOST:
             raise ValueError(f"there are {MOST} presets, which is the most that are kept; delete one first")
-        preset = {"view": self._view.state()}
+        preset: dict[str, Any] = {"view": self._view.state()}
         if self._operator:
             preset["look_ahead_s"] = self._view.look_ahead_s
             preset["objects"] = self._ask(op="objects")["bodies"]
