@@ -40,7 +40,7 @@ class Clip:
     performed_s: tuple[float, float]
     """Seconds after the start of the demo; the same twice for an instant."""
     window: tuple[int, int] = (880, 440)
-    shown: tuple[int, int] = (440, 352)
+    shown: tuple[int, int] = (440, 264)
     whole: bool = False
     """Whether the panel is in the picture, and the camera follows; otherwise it is the stage, and the camera stands."""
     rate_hz: float = 6.0
@@ -122,10 +122,9 @@ def picture(page: Page, clip: Clip) -> Image.Image:
     screenshot = base64.b64decode(page.call("Page.captureScreenshot")["data"])
     image = Image.open(io.BytesIO(screenshot)).convert("RGB")
     if not clip.whole:
-        left, top, width, height = page.evaluate(PLACE)
-        wide = min(width, height * clip.shown[0] / clip.shown[1])
-        middle = left + 0.5 * width
-        image = image.crop((round(middle - 0.5 * wide), round(top), round(middle + 0.5 * wide), round(top + height)))
+        left, top, width, _ = page.evaluate(PLACE)
+        high = width * clip.shown[1] / clip.shown[0]  # what is below shows only the table
+        image = image.crop((round(left), round(top), round(left + width), round(top + high)))
     return image.resize(clip.shown, Image.Resampling.LANCZOS)
 
 

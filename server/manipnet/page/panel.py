@@ -1,5 +1,6 @@
 """The panel of one visitor: the state of the server for everybody, and controls for operators."""
 
+import threading
 import time
 from collections.abc import Sequence
 from typing import Any, Final
@@ -56,7 +57,7 @@ class Panel:
         tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
             self._view_tab = ViewTab(ask, show, client, self._camera, self.perform, operator)
-            Presets(ask, client, self._view_tab, self.perform, operator)
+            self._presets = Presets(ask, client, self._view_tab, self.perform, operator)
         if operator:
             with tabs.add_tab("Objects"):
                 self.objects = ObjectsTab(ask, client, self.perform)
@@ -74,6 +75,7 @@ class Panel:
         side.dock_left()
         if client.camera.image_width < NARROW_PX:
             side.minimize()
+        threading.Thread(target=self._remember, name="remember", daemon=True).start()
 
     def refresh(self) -> None:
         """Show the newest state of the server; called twice a second."""
@@ -108,6 +110,11 @@ class Panel:
         else:
             if text:
                 self._client.add_notification("Done", text, color="green", auto_close_seconds=NOTE_S)
+
+    def _remember(self) -> None:
+        """Ask the browser what it has kept; on a thread of its own, because an answer takes a while."""
+        self._view_tab.remember()
+        self._presets.remember()
 
     def _refresh(self) -> None:
         now_s = time.monotonic()

@@ -2,7 +2,6 @@
 
 import json
 import math
-import threading
 from typing import Any, Final
 
 import viser
@@ -35,12 +34,12 @@ class Presets:
         delete = gui.add_button("Delete this preset", icon=viser.Icon.TRASH, color="gray")
         for button, action in ((use, self._use), (save, self._save), (delete, self._delete)):
             button.on_click(lambda _, action=action: perform(action))
-        threading.Thread(target=self._remember, name="presets", daemon=True).start()
 
-    def _remember(self) -> None:
-        """Offer what this browser has kept; runs on a thread of its own, because it waits for the answer."""
-        self._presets = {**read_presets(remembered(self._client, KEY)), **self._presets}
-        self._offer()
+    def remember(self) -> None:
+        """Offer what this browser has kept; waits for its answer."""
+        if kept := read_presets(remembered(self._client, KEY)):
+            self._presets = {**kept, **self._presets}
+            self._offer()
 
     def _save(self) -> str:
         name = self._name.value.strip()

@@ -1,6 +1,5 @@
 """The tab about what a visitor sees: camera, look-ahead, theme and layers. All but the look-ahead is his own."""
 
-import threading
 from typing import Any, Final
 
 import viser
@@ -51,7 +50,6 @@ class ViewTab:
             gui.add_html(legend(layer))
             box.on_update(lambda event, name=name: self._set_layer(name, event.target.value))
         self._apply_theme()
-        threading.Thread(target=self._remember_theme, name="theme", daemon=True).start()
 
     def refresh(self, look_ahead_s: float) -> None:
         """Show whether the camera follows, and the look-ahead that is in force."""
@@ -97,8 +95,8 @@ class ViewTab:
         self._apply_theme()
         self._client.local_storage.set_item(THEME, "dark" if self._dark else "light")
 
-    def _remember_theme(self) -> None:
-        """Use the theme that this browser used before; runs on a thread of its own, because it waits for the answer."""
+    def remember(self) -> None:
+        """Use the theme that this browser used before; waits for its answer."""
         if remembered(self._client, THEME) == "light":
             self._dark = False
             self._apply_theme()
