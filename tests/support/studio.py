@@ -36,6 +36,11 @@ T_CLUSTER_WRIST = np.concatenate([[0.02, 0.03, -0.01], quat_exp(np.array([0.4, -
 BOX = np.array([0.05, 0.1, 0.05, 0.0, 0.0, 0.0, 1.0])
 DISABLED = "[...document.querySelectorAll('button')].find(one => one.textContent.trim() === '%s').disabled"
 FOLLOWING = DISABLED % "Follow the hands"
+TABS = """(() => {
+  const tabs = [...document.querySelectorAll('[role=tab]')].filter(one => one.offsetParent);
+  return tabs.length > 4 && tabs.map(one => Object.values(one.getBoundingClientRect().toJSON()).join()).join();
+})()"""
+"""Where the tabs are; false before all are there."""
 OPENED = """[...document.querySelectorAll('[role=tab]')].some(
   one => one.textContent.trim() === '%s' && one.getAttribute('aria-selected') === 'true')"""
 SECOND = """(() => {
@@ -111,6 +116,14 @@ class Studio:
                 return left + columns[tip] - 8.0, float(top + rows[tip])
             assert time.monotonic() < give_up_s, "no arrow is drawn"
 
+    def wait_until_it_stands(self) -> None:
+        """Wait until a page that was just loaded is live and moves no more: a click during that hits something else."""
+        self.page.wait_for(f"window.complaints && {TEXT}.includes('hands/s')", PATIENCE_S)
+        place, before = self.page.wait_for(TABS, PATIENCE_S), None
+        while place != before:
+            time.sleep(1.0)
+            place, before = self.page.wait_for(TABS, PATIENCE_S), place
+
     def open(self, tab: str) -> None:
         """Open a tab of the panel, clicking again if the panel was moving under the mouse."""
         opened, give_up_s = OPENED % tab, time.monotonic() + PATIENCE_S
@@ -172,7 +185,7 @@ def studio_in(folder: Path, model: Path) -> Iterator[Studio]:
         page.call("Page.addScriptToEvaluateOnNewDocument", source=COMPLAIN)
         page.call("Page.reload")
         studio = Studio(server, page, rig, takes, bodies)
-        studio.says("hands/s")
+        studio.wait_until_it_stands()
         yield studio
         assert page.evaluate("window.complaints.join('; ') || 'none'") == "none"
         assert "page_ended" not in server.ask({"op": "status"})["counters"]
