@@ -61,6 +61,7 @@ def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> N
     page.wait_for("document.querySelector('.mn-recording') !== null", PATIENCE_S)
     page.key("r")
     page.wait_for("document.querySelector('.mn-recording') === null", PATIENCE_S)
+    studio.until(lambda _: list(studio.takes.glob("take *.mcap")))
     (dated,) = studio.takes.glob("take *.mcap")
     dated.rename(studio.takes / "spare.mcap")
 

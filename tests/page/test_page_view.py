@@ -41,6 +41,7 @@ def test_the_theme_is_light_or_dark_and_remembered(studio: Studio) -> None:
     page.click("Light theme")
     page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
     page.call("Page.reload")
+    studio.wait_until_it_stands()
     page.wait_for(f"{scheme} === 'light'", PATIENCE_S)
     page.click("Dark theme", PATIENCE_S)
     page.wait_for(f"{scheme} === 'dark'", PATIENCE_S)
@@ -64,6 +65,7 @@ def test_presets_keep_what_is_seen_and_what_the_bodies_carry(studio: Studio) -> 
     studio.server.ask({"op": "select_object", "actor": "actor", "body": "Box", "object": "torus"})
     studio.until(lambda message: message.look_ahead == pytest.approx(0.3))
     page.call("Page.reload")
+    studio.wait_until_it_stands()
     studio.open("View")
     page.wait_for(NAMED % "day", PATIENCE_S)  # this browser has kept it
     page.click("Use this preset")
@@ -80,7 +82,7 @@ def test_a_tablet_shows_stage_and_controls_side_by_side(studio: Studio) -> None:
     page = studio.page
     page.call("Emulation.setDeviceMetricsOverride", width=768, height=1024, deviceScaleFactor=1, mobile=True)
     page.call("Page.reload")
-    studio.says("● Live")
+    studio.wait_until_it_stands()
     page.wait_for(f"({STAGE})[0] > 0 && innerWidth === 768", PATIENCE_S)
     width = page.wait_for("parseFloat(getComputedStyle(document.documentElement).getPropertyValue('--mn-width'))")
     assert width > 350
@@ -93,4 +95,4 @@ def test_a_tablet_shows_stage_and_controls_side_by_side(studio: Studio) -> None:
     assert page.evaluate(WIDE_TABS) == 0
     page.call("Emulation.setDeviceMetricsOverride", width=1000, height=700, deviceScaleFactor=1, mobile=False)
     page.call("Page.reload")
-    studio.says("● Live")
+    studio.wait_until_it_stands()
