@@ -85,10 +85,9 @@ def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> N
     page.wait_for(NAMED % "spare", PATIENCE_S)
     page.choose("Take", "12A take 1.mcap")
     page.wait_for(NAMED % "12A take 1", PATIENCE_S)
-    page.type("Name", "best of all", enter=False)
-    page.type("Its slate", "12B", enter=False)
-    page.type("Its number", "3", enter=False)
-    studio.settle()
+    for field, text in {"Name": "best of all", "Its slate": "12B", "Its number": "3"}.items():
+        page.type(field, text, enter=False)
+        studio.settle()
     assert not list(studio.takes.glob("b*"))  # not renamed letter by letter
     page.click("Keep changes")
     studio.until(lambda _: notes_of(studio, "best of all") == {"slate": "12B", "number": 3, "note": "ran r rr"})

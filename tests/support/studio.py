@@ -86,7 +86,8 @@ class Studio:
         return message
 
     def settle(self) -> None:
-        """Let the server's clock go on a little. A browser sends what is typed slightly later than clicks."""
+        """Let the server's clock go on a little. A browser sends what is typed slightly later than clicks,
+        and only the newest field if two are changed at nearly the same time."""
         end_s = self.server.ask({"op": "status"})["uptime_s"] + 0.3
         while self.server.ask({"op": "status"})["uptime_s"] < end_s:
             pass
