@@ -97,7 +97,8 @@ def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> N
     studio.until(lambda _: copy.exists() and copy.stat().st_size == (studio.takes / copy.name).stat().st_size)
     page.click("Delete …")
     page.click("Keep it", PATIENCE_S)
-    page.wait_for("document.querySelector('[role=dialog]') === null", PATIENCE_S)  # it fades over the page
+    page.wait_for(f"!{TEXT}.includes('cannot be brought back')", PATIENCE_S)
+    studio.settle()  # the question fades, and takes clicks meanwhile
     page.click("Delete …")
     page.click("Delete it", PATIENCE_S)
     studio.until(lambda _: [file.name for file in studio.takes.iterdir()] == ["spare.mcap"])
