@@ -36,6 +36,11 @@ def test_the_headline_says_what_is_the_case(report: dict[str, Any], level: str, 
     assert (state.level, state.text) == (level, text)
 
 
+@pytest.mark.parametrize(("hands_hz", "level"), [(0.0, "good"), (9.0, "notice"), (40.0, "notice"), (58.0, "good")])
+def test_hands_that_stutter_are_not_in_order(hands_hz: float, level: str) -> None:
+    assert verdict(status(left_wrist=0.01, right_wrist=0.01), hands_hz).level == level
+
+
 def test_durations_are_read_at_a_glance() -> None:
     assert [duration(s) for s in (0.012, 5.0, 530.0, 1800.0, 90_000.0)] == ["12 ms", "5 s", "530 s", "30 min", "25 h"]
 

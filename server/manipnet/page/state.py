@@ -5,9 +5,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from manipnet.tracking.tick import TICK_HZ
+
 Level = Literal["good", "notice", "bad"]
 STALE_S: Final = 1.0
 """Bodies and hands that are older than this are not live, whatever was measured before."""
+
+SLOW_HZ: Final = 0.8 * TICK_HZ
+"""Motion that has fewer hands a second is seen to stutter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,10 @@ def verdict(status: Mapping[str, Any], hands_hz: float) -> Verdict:
     missing = [part for part, age_s in ages if age_s is None and part.endswith("_wrist")]
     if missing:
         return Verdict("notice", f"Live without {' and '.join(missing)}", f"{hands_hz:.0f} hands/s")
+    if 0.0 < hands_hz < SLOW_HZ:  # zero means that they have not been counted yet
+        return Verdict(
+            "notice", "Live, but too slow", f"{hands_hz:.0f} of {TICK_HZ} hands/s: this computer is too busy"
+        )
     return Verdict("good", "Live", f"{hands_hz:.0f} hands/s")
 
 
