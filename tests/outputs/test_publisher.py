@@ -2,6 +2,7 @@
 
 import itertools
 import threading
+import time
 from contextlib import ExitStack
 
 import pytest
@@ -29,10 +30,11 @@ from manipnet.outputs.declaration import Emission
 from manipnet.outputs.publisher import Publisher
 from manipnet.outputs.websocket import WebSocketOptions
 from manipnet.outputs.zeromq import ZmqOutputOptions
+from manipnet.outputs.zeromq.publisher import ZmqPublisher
 from manipnet.outputs.zeromq.subscriptions import FORGET_AFTER_S, Subscriptions
 from manipnet.synthesis.model.shipped import shipped_hand
 from manipnet.telemetry import Telemetry
-from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack
+from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK, decode_binary, encode_binary, encode_msgpack, hand_topics
 
 CONFIG = ServerConfig((), protocols=(ZmqOutputOptions(port=0), WebSocketOptions(web_port=0)))
 MOST_KEPT_BYTES = 6 << 20
@@ -127,9 +129,31 @@ def test_a_stranger_who_unsubscribes_takes_the_hands_from_nobody(publisher, cont
         stranger.close()
 
 
+def test_hands_of_an_avatar_are_wanted_until_the_last_subscriber_leaves_whatever_strangers_send(telemetry, context):
+    publisher = ZmqPublisher(telemetry, "127.0.0.1", 0)
+    topic = hand_topics("hero")[0]
+    sub = subscriber(context, publisher.address, topic)
+    wait_until(lambda: publisher.wants("hero"))
+    stranger = RawSubscriber(publisher.address)
+    stranger.send(UNSUBSCRIBE + topic)
+    stranger.send(SUBSCRIBE + hand_topics("other")[0])
+    wait_until(lambda: publisher.wants("other"))  # both were read
+    assert publisher.wants("hero")
+    sub.close()
+    wait_until(lambda: not publisher.wants("hero"))
+    stranger.close()
+    publisher.close()
+
+
+def wait_until(condition):
+    give_up_s = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < give_up_s
+
+
 def test_subscriptions_are_forgotten_when_nobody_has_been_connected_for_a_while():
     subscriptions = Subscriptions()
-    subscriptions.note(b"\x01pose/", 1.0)
+    subscriptions.note(b"\x01pose/", True, 1.0)
     in_time_s = 50.0 + FORGET_AFTER_S
     for connected, now_s, known in ((0, 2.0, True), (1, 50.0, True), (0, in_time_s, True), (0, in_time_s + 1.0, False)):
         subscriptions.count(connected, now_s)

@@ -200,7 +200,13 @@ def serving(folder: Path, replaced: dict[str, str] | None = None) -> Iterator[st
 def browsing(chromium: str, url: str, profile: Path) -> Iterator[Page]:
     """A Chromium showing a page."""
     options = ["--headless=new", "--no-sandbox", "--remote-debugging-port=0", f"--user-data-dir={profile}"]
-    options += ["--no-first-run", "--disable-gpu-sandbox", "--enable-unsafe-swiftshader", "--window-size=1280,720"]
+    options += [
+        "--no-first-run",
+        "--disable-gpu-sandbox",
+        "--enable-unsafe-swiftshader",
+        "--window-size=1280,720",
+        "--force-device-scale-factor=0.5",
+    ]
     environment = {**os.environ, "HOME": str(profile)}
     process = subprocess.Popen(
         [chromium, *options, url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=environment

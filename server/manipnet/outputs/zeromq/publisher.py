@@ -82,7 +82,8 @@ class ZmqPublisher(HandsOutput):
             for _ in range(READ_AT_ONCE):
                 if not int(self._bound.socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN:
                     return  # reading would raise an exception, which costs ten times more
-                self._subscriptions.note(self._bound.socket.recv(zmq.NOBLOCK), now_s)
+                frame = self._bound.socket.recv(zmq.NOBLOCK, copy=False)
+                self._subscriptions.note(frame.bytes, _is_from_client(frame), now_s)
         except zmq.Again:
             pass
         except zmq.ZMQError as error:
@@ -118,3 +119,11 @@ class ZmqPublisher(HandsOutput):
         self._pauses.opened()
         self._health.up()
         return True
+
+
+def _is_from_client(frame: zmq.Frame) -> bool:
+    """Whether a client has sent it: what the socket itself reports has no address."""
+    try:
+        return bool(frame.get("Peer-Address"))
+    except zmq.ZMQError:
+        return False

@@ -13,8 +13,9 @@ FORGET_AFTER_S: Final = 10.0
 class Subscriptions:
     """The prefixes of topics that clients have subscribed to since somebody was connected.
 
-    The end of a subscription is not believed: the socket also passes on those of clients that never subscribed, so that
-    one packet of a stranger would take the hands from everybody else.
+    The end of a subscription is only believed when the socket itself reports it, because the last subscriber has
+    disconnected. It also passes on what clients send, even from one that never subscribed, so that one packet of a
+    stranger would take the hands from everybody else.
     """
 
     def __init__(self) -> None:
@@ -22,13 +23,14 @@ class Subscriptions:
         self._in_use_s = 0.0
         """When somebody was last seen connected, or subscribed."""
 
-    def note(self, message: bytes, now_s: float) -> None:
-        """Take in what the socket has received from a client."""
-        if message[:1] != b"\x01":
-            return
-        self._in_use_s = now_s
-        if len(self._prefixes) < MAX_SUBSCRIPTIONS:
-            self._prefixes.add(message[1:])
+    def note(self, message: bytes, is_from_client: bool, now_s: float) -> None:
+        """Take in a message of the socket, which a client has sent or which reports that one has disconnected."""
+        if message[:1] == b"\x00" and not is_from_client:
+            self._prefixes.discard(message[1:])
+        elif message[:1] == b"\x01":
+            self._in_use_s = now_s
+            if len(self._prefixes) < MAX_SUBSCRIPTIONS:
+                self._prefixes.add(message[1:])
 
     def count(self, connected: int, now_s: float) -> None:
         """Take in how many clients are connected, and forget everything when nobody has been for some time."""
