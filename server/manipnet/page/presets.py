@@ -43,8 +43,8 @@ class Presets:
 
     def _save(self) -> str:
         name = self._name.value.strip()
-        if not 0 < len(name) <= LONGEST_NAME:
-            raise ValueError(f"give the new preset a name of 1 to {LONGEST_NAME} characters")
+        if not 0 < len(name) <= LONGEST_NAME or name == NONE:
+            raise ValueError(f"give the new preset a name of 1 to {LONGEST_NAME} characters other than {NONE!r}")
         if name not in self._presets and len(self._presets) >= MOST:
             raise ValueError(f"there are {MOST} presets, which is the most that are kept; delete one first")
         preset: dict[str, Any] = {"view": self._view.state()}

@@ -5,7 +5,7 @@ from typing import Final
 from manipnet.wire import TOPIC_BIN, TOPIC_MSGPACK
 
 MAX_SUBSCRIPTIONS: Final = 4096
-"""Prefixes of topics that are remembered; beyond them, nobody's subscription to an avatar is noticed."""
+"""Prefixes of topics that are remembered; further subscriptions to avatars are not noticed."""
 FORGET_AFTER_S: Final = 10.0
 """How long nobody must be connected before the subscriptions are forgotten: another thread counts connections."""
 
