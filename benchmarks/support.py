@@ -6,6 +6,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT / "clients" / "python")]
 
+from avatar_profiles import scaled_profile  # noqa: E402
 from browser import browsing  # noqa: E402
 from fake_motive import FakeMotive  # noqa: E402
 from languages import LiveClient, build  # noqa: E402
@@ -30,6 +31,7 @@ __all__ = [
     "build",
     "peak_acceleration",
     "play",
+    "scaled_profile",
     "serving",
     "source",
     "turn_about_z",

@@ -131,6 +131,7 @@ def test_a_stranger_who_unsubscribes_takes_the_hands_from_nobody(publisher, cont
 
 def test_hands_of_an_avatar_are_wanted_until_the_last_subscriber_leaves_whatever_strangers_send(telemetry, context):
     publisher = ZmqPublisher(telemetry, "127.0.0.1", 0)
+    assert publisher.address is not None
     topic = hand_topics("hero")[0]
     sub = subscriber(context, publisher.address, topic)
     wait_until(lambda: publisher.wants("hero"))

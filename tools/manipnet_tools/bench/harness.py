@@ -12,6 +12,7 @@ import numpy as np
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
+from manipnet.runtime.avatars import Avatars
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.tick_loop import TickLoop
@@ -67,7 +68,7 @@ class ObservedSynthesizer(Synthesizer):
 class TickRunner:
     """Runs a tick loop on the frames of a scenario, one tick at a time."""
 
-    def __init__(self, bundle: Bundle, scenario: Scenario, actors: int = 1) -> None:
+    def __init__(self, bundle: Bundle, scenario: Scenario, actors: int = 1, avatars: Avatars | None = None) -> None:
         self.watch = Stopwatch()
         self.synthesizer = ObservedSynthesizer(bundle, on_stage=self.watch.ended)
         self._frames = endless(scenario, actors)
@@ -87,6 +88,7 @@ class TickRunner:
             self._mailbox,
             FlightRecorder(Path(tempfile.gettempdir())),
             telemetry,
+            avatars=avatars,
         )
         for _ in range(WARM_UP_TICKS):
             self.tick()
