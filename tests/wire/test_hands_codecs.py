@@ -121,6 +121,39 @@ def test_any_wrong_part_of_a_map_raises_only_message_error(path, junk):
         return
 
 
+NUMBER = st.floats(-1e12, 1e12)
+NAME = st.text(max_size=40) | st.sampled_from(["\xcb\xffManipN\x01", "\xffManipN\x01"])
+
+
+@given(
+    *(NUMBER, NUMBER, st.integers(0, 2**64 - 1), NAME, NAME, st.booleans(), st.booleans()),
+    st.none() | st.just(np.array([0.0, 1.0, -2.0])),
+)
+def test_msgpack_is_the_map_of_the_document_as_any_packer_writes_it(
+    number, other, seq, name, thing, tracked, timed, shift
+):
+    hand = replace(LIVE.hands["left"], object=thing or None, angles=np.full(20, number), wrist_shift=shift)
+    message = replace(
+        LIVE,
+        session=name,
+        seq=seq,
+        t_capture=other,
+        hands={"right": hand} | ({"left": LIVE.hands["left"]} if tracked else {}),
+        bodies=tuple(replace(body, name=name, tracked=tracked) for body in LIVE.bodies),
+        timecode="01:02:03:04" if timed else None,
+        hand=None if shift is None else name,
+    )
+    payload = wire.encode_msgpack(message)
+    content = msgpack.unpackb(payload)
+    assert msgpack.packb(content) == payload
+    assert content["seq"] == seq
+    assert content["hands"]["right"]["angles"] == [number] * 20
+    assert content["hands"]["right"].get("wrist_shift") == (None if shift is None else shift.tolist())
+    read = wire.decode_msgpack(payload)
+    assert make_vectors.expected(read) == make_vectors.expected(message)
+    assert (read.session, read.bodies[0].name, read.t_capture) == (name, name, other)
+
+
 @given(st.binary(max_size=64))
 def test_garbage_raises_only_message_error(data):
     for decode in (wire.decode_binary, wire.decode_msgpack):

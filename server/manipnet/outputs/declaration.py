@@ -52,7 +52,7 @@ class EncodedHands:
         """Raises `MessageError` for a message that breaks the protocol's rules, before anybody gets it."""
         from manipnet.wire import check
 
-        check(message)
+        self._numbers = check(message)
         self.message = message
 
     @cached_property
@@ -60,14 +60,14 @@ class EncodedHands:
         """The payload of `pose/bin`."""
         from manipnet.wire import encode_binary
 
-        return encode_binary(self.message, checked=True)
+        return encode_binary(self.message, self._numbers)
 
     @cached_property
     def msgpack(self) -> bytes:
         """The payload of `pose/msgpack`."""
         from manipnet.wire import encode_msgpack
 
-        return encode_msgpack(self.message, checked=True)
+        return encode_msgpack(self.message, self._numbers)
 
 
 class HandsOutput:

@@ -37,7 +37,7 @@ def _extended(value: Any) -> msgpack.ExtType:
     if isinstance(value, np.ndarray):
         return msgpack.ExtType(_ARRAY, _packed((value.dtype.str, value.shape, value.tobytes())))
     if isinstance(value, HandsMessage):
-        return msgpack.ExtType(_HANDS, encode_msgpack(value, checked=True))
+        return msgpack.ExtType(_HANDS, encode_msgpack(value))
     if type(value) not in _CODES:
         raise TypeError(f"{type(value).__name__} cannot be sent to or from the page")
     return msgpack.ExtType(_CODES[type(value)], _packed([getattr(value, field.name) for field in fields(value)]))

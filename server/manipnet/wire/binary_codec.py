@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from manipnet.geometry import SIDES, Side
+from manipnet.geometry import SIDES, Array, Side
 from manipnet.wire.bodies import MAX_BODIES, MessageError
 from manipnet.wire.hands import (
     BODY,
@@ -31,19 +31,22 @@ from manipnet.wire.hands import (
     HandsMessage,
     Latency,
 )
+from manipnet.wire.numbers import HAND_NUMBERS, hand_starts
 from manipnet.wire.validation import check, require_version
 
 
-def encode_binary(message: HandsMessage, checked: bool = False) -> bytes:
+def encode_binary(message: HandsMessage, numbers: Array | None = None) -> bytes:
     """Encode a message as the records of `docs/protocol.md`. Names are cut to `NAME_BYTES`, between two characters.
 
-    `checked` means that `check` has just accepted the same message. Raises `MessageError` for a message that breaks a
-    rule, for example with a number that is not finite.
+    `numbers` are what `check` has just returned for the same message. Without them, raises `MessageError` for a message
+    that breaks a rule, for example with a number that is not finite.
     """
-    if not checked:
-        check(message)
+    floats = (check(message) if numbers is None else numbers).astype("<f4").tobytes()
     timed = message.timecode is not None
-    hands = [_hand_record(side, hand) for side, hand in message.hands.items()]
+    hands = [
+        _hand_record(side, hand, floats[4 * start : 4 * (start + HAND_NUMBERS)])
+        for (side, hand), start in zip(message.hands.items(), hand_starts(message), strict=False)
+    ]
     bodies = [_BODY.pack(body.tracked, *body.pose.tolist(), _name(body.name)) for body in message.bodies]
     size = (TIMED_HEADER if timed else HEADER).itemsize
     total = size + len(hands) * HAND.itemsize + len(bodies) * BODY.itemsize
@@ -121,14 +124,16 @@ def _hand(record: np.void, index: int) -> HandPose:
 _CODES: Mapping[str, str] = {"u1": "B", "u2": "H", "u4": "I", "u8": "Q", "f4": "f", "f8": "d", "S4": "4s"}
 
 
-def _packer(dtype: np.dtype, names: Sequence[str] = ()) -> struct.Struct:
-    """Packs the fields of a record, or those named, from their first to the end of the record."""
+def _packer(dtype: np.dtype, names: Sequence[str] = (), end: int | None = None) -> struct.Struct:
+    """Packs the fields of a record, or those named, from their first to the end of the record or to the byte `end`."""
+    end = dtype.itemsize if end is None else end
     places = [place[:2] for name, place in (dtype.fields or {}).items() if not names or name in names]
+    places = [(kind, offset) for kind, offset in places if offset < end]
     text, at = "<", places[0][1]
     for kind, offset in places:
         text += "x" * (offset - at) + _code(kind)
         at = offset + kind.itemsize
-    return struct.Struct(text + "x" * (dtype.itemsize - at))
+    return struct.Struct(text + "x" * (end - at))
 
 
 def _code(kind: np.dtype) -> str:
@@ -141,16 +146,15 @@ def _code(kind: np.dtype) -> str:
     return code if base.kind == "S" else f"{math.prod(shape)}{code}"
 
 
-_HEADER, _HAND, _BODY = _packer(HEADER), _packer(HAND), _packer(BODY)
+_HEADER, _BODY = _packer(HEADER), _packer(BODY)
+_HAND_WORDS = _packer(HAND, end=(HAND.fields or {})["scale"][1])
+"""What comes before the numbers of a hand, which follow one another to the end of its record."""
 _TIMECODE = _packer(TIMED_HEADER, ("timecode", "timecode_rate"))
 
 
-def _hand_record(side: Side, hand: HandPose) -> bytes:
-    numbers = (hand.angles, hand.rotations, hand.wrist, hand.joints)
-    return _HAND.pack(
-        *(SIDES.index(side), hand.object is not None, STATES.index(hand.state), _name(hand.object or ""), hand.scale),
-        *np.concatenate([part.ravel() for part in numbers]).tolist(),
-    )
+def _hand_record(side: Side, hand: HandPose, numbers: bytes) -> bytes:
+    words = SIDES.index(side), hand.object is not None, STATES.index(hand.state), _name(hand.object or "")
+    return _HAND_WORDS.pack(*words) + numbers
 
 
 def _name(name: str) -> bytes:

@@ -1,7 +1,11 @@
 """Encodes the hands message as a msgpack map, the payload of the topic `pose/msgpack`."""
 
-from dataclasses import fields
-from typing import Any
+import re
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from typing import Any, Final
 
 import msgpack
 import numpy as np
@@ -9,34 +13,82 @@ import numpy as np
 from manipnet.geometry import Array
 from manipnet.wire.bodies import MessageError
 from manipnet.wire.hands import MAX_PAYLOAD_BYTES, BodyPose, HandPose, HandsMessage, Latency
+from manipnet.wire.numbers import HAND_SHAPES, LATENCIES, SHIFT_SHAPE
 from manipnet.wire.validation import check, known_side, require_version
 
+_ANY: Final = struct.unpack(">d", b"\xffManipN\x01")[0]
+"""Stands for a number in a template. No name contains its bytes, because UTF-8 never has the first of them."""
+_ANY_POSE: Final = {"p": [_ANY] * 3, "q": [_ANY] * 4}
 
-def encode_msgpack(message: HandsMessage, checked: bool = False) -> bytes:
+
+@dataclass(frozen=True)
+class _Template:
+    """The bytes of a message in which only the numbers and the words at its end change from tick to tick."""
+
+    start: bytes
+    """All before the value of `seq`."""
+    middle: bytes
+    """All from `t_capture` to the latency."""
+    places: np.ndarray
+    """Where the numbers are in `middle`, in the order of `numbers_of`: big-endian, 8 bytes each."""
+
+
+def encode_msgpack(message: HandsMessage, numbers: Array | None = None) -> bytes:
     """Encode a message as the map of `docs/protocol.md`.
 
-    `checked` means that `check` has just accepted the same message. Raises `MessageError` for a message that
-    breaks a rule, for example with a number that is not finite.
+    `numbers` are what `check` has just returned for the same message. Without them, raises `MessageError` for a message
+    that breaks a rule, for example with a number that is not finite.
     """
-    if not checked:
-        check(message)
-    payload = msgpack.packb(
-        {
-            "v": message.v,
-            "session": message.session,
-            "actor": message.actor,
-            "seq": int(message.seq),
-            "t_capture": float(message.t_capture),
-            "t_publish": float(message.t_publish),
-            "look_ahead": float(message.look_ahead),
-            "hands": {side: _hand_map(hand) for side, hand in message.hands.items()},
-            "bodies": [_body_map(body) for body in message.bodies],
-            "latency_ms": {f.name: float(getattr(message.latency_ms, f.name)) for f in fields(Latency)},
-            "timecode": message.timecode,
-            "timecode_rate": None if message.timecode_rate is None else float(message.timecode_rate),
-            **({} if message.hand is None else {"hand": message.hand}),
-        }
+    numbers = check(message) if numbers is None else numbers
+    hands = tuple((side, hand.state, hand.object, hand.wrist_shift is None) for side, hand in message.hands.items())
+    bodies = tuple((body.name, bool(body.tracked)) for body in message.bodies)
+    template = _template(message.v, message.session, message.actor, hands, bodies, message.hand is None)
+    middle = bytearray(template.middle)
+    np.ndarray((len(middle) - 7,), ">f8", middle, strides=(1,))[template.places] = numbers
+    rate = None if message.timecode_rate is None else float(message.timecode_rate)
+    end = {"timecode": message.timecode, "timecode_rate": rate}
+    end |= {} if message.hand is None else {"hand": message.hand}
+    return b"".join((template.start, _pack(int(message.seq)), middle, _pairs(end)))
+
+
+@lru_cache(128)
+def _template(
+    version: int,
+    session: str,
+    actor: str,
+    hands: tuple[tuple[str, str, str | None, bool], ...],
+    bodies: tuple[tuple[str, bool], ...],
+    of_model: bool,
+) -> _Template:
+    """The template of all messages with these words.
+
+    A hand is its side, state and object, and whether its wrist is where it is tracked. A body is its name, and
+    whether it is tracked.
+    """
+    hand_maps = {}
+    for side, state, thing, unshifted in hands:
+        arrays = {name: np.full(shape, _ANY).tolist() for name, shape in HAND_SHAPES}
+        hand_maps[side] = {"state": state, "object": thing, "scale": _ANY} | arrays | {"wrist": _ANY_POSE}
+        hand_maps[side] |= {} if unshifted else {"wrist_shift": [_ANY] * SHIFT_SHAPE[0]}
+    middle = _pairs(
+        dict.fromkeys(("t_capture", "t_publish", "look_ahead"), _ANY)
+        | {"hands": hand_maps}
+        | {"bodies": [{"name": name} | _ANY_POSE | {"tracked": tracked} for name, tracked in bodies]}
+        | {"latency_ms": dict.fromkeys(LATENCIES, _ANY)}
     )
+    places = [found.start() + 1 for found in re.finditer(re.escape(_pack(_ANY)), middle, re.DOTALL)]
+    start = msgpack.Packer().pack_map_header(12 if of_model else 13)
+    start += _pairs({"v": version, "session": session, "actor": actor}) + _pack("seq")
+    return _Template(start, middle, np.array(places, np.intp))
+
+
+def _pairs(values: Mapping[str, Any]) -> bytes:
+    """The keys and values of a map, without its header."""
+    return b"".join(_pack(key) + _pack(value) for key, value in values.items())
+
+
+def _pack(value: Any) -> bytes:
+    payload = msgpack.packb(value)
     assert payload is not None  # only None when msgpack streams into a buffer
     return payload
 
@@ -69,24 +121,6 @@ def decode_msgpack(payload: bytes) -> HandsMessage:
     )
     check(message)
     return message
-
-
-def _hand_map(hand: HandPose) -> dict[str, Any]:
-    return {
-        "state": hand.state,
-        "object": hand.object,
-        "scale": float(hand.scale),
-        "angles": hand.angles.tolist(),
-        "rotations": hand.rotations.tolist(),
-        "wrist": {"p": hand.wrist[:3].tolist(), "q": hand.wrist[3:].tolist()},
-        "joints": hand.joints.tolist(),
-        **({} if hand.wrist_shift is None else {"wrist_shift": hand.wrist_shift.tolist()}),
-    }
-
-
-def _body_map(body: BodyPose) -> dict[str, Any]:
-    pose = body.pose.tolist()
-    return {"name": body.name, "p": pose[:3], "q": pose[3:], "tracked": bool(body.tracked)}
 
 
 def _hand_value(value: Any, where: str) -> HandPose:
