@@ -18,6 +18,8 @@ from manipnet.wire.validation import check, known_side, require_version
 
 _ANY: Final = struct.unpack(">d", b"\xffManipN\x01")[0]
 """Stands for a number in a template. No name contains its bytes, because UTF-8 never has the first of them."""
+_SMALL_MAP: Final = 0x80
+"""The header of a map, to which the number of its entries is added: https://github.com/msgpack/msgpack/blob/master/spec.md"""
 _ANY_POSE: Final = {"p": [_ANY] * 3, "q": [_ANY] * 4}
 
 
@@ -77,8 +79,11 @@ def _template(
         | {"latency_ms": dict.fromkeys(LATENCIES, _ANY)}
     )
     places = [found.start() + 1 for found in re.finditer(re.escape(_pack(_ANY)), middle, re.DOTALL)]
-    start = msgpack.Packer().pack_map_header(12 if of_model else 13)
-    start += _pairs({"v": version, "session": session, "actor": actor}) + _pack("seq")
+    start = (
+        bytes([_SMALL_MAP + (12 if of_model else 13)])
+        + _pairs({"v": version, "session": session, "actor": actor})
+        + _pack("seq")
+    )
     return _Template(start, middle, np.array(places, np.intp))
 
 
