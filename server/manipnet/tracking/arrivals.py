@@ -18,17 +18,22 @@ class Arrivals:
         """Stream time of the newest frame, and our clock when it arrived."""
         self._gaps_s = deque[float](maxlen=32)
         self._arrivals = deque[tuple[float, float]](maxlen=1024)
+        self._silence_s: float | None = SILENCE_S
+        """What `silence_s` returned last; None if frames have arrived since."""
 
     def note(self, t_s: float, now_s: float) -> None:
         """Note a frame of stream time `t_s`; one that is late changes nothing."""
         if t_s > self.newest_s:
             self._gaps_s.append(now_s - self.heard_s)
+            self._silence_s = None
             self.newest_s, self.heard_s = t_s, now_s
             self._arrivals.append((t_s, now_s))
 
     def silence_s(self) -> float:
         """How long without a frame counts as silence."""
-        return max(SILENCE_S, 3.0 * median(self._gaps_s)) if self._gaps_s else SILENCE_S
+        if self._silence_s is None:
+            self._silence_s = max(SILENCE_S, 3.0 * median(self._gaps_s))
+        return self._silence_s
 
     def clock_s(self, now_s: float) -> float:
         """Stream time if the sender's clock went on since its newest frame."""

@@ -68,15 +68,16 @@ class OutlierGate:
 
     def check(self, frame: BodyFrame) -> tuple[BodyFrame, list[str]]:
         """The frame with impossible bodies made untracked, and the reasons, of `telemetry.BODY_REASONS`."""
-        swapped = self._swapped(frame)
-        bodies = [self._judge(frame, body, body in swapped) for body in frame.bodies]
+        keys = [(frame.source, body.id, body.name) for body in frame.bodies]
+        swapped = self._swapped(frame, keys)
+        bodies = [
+            self._judge(frame, key, body, body in swapped) if body.tracked else body
+            for key, body in zip(keys, frame.bodies, strict=True)
+        ]
         reasons = [body.fault for body in bodies if body.fault is not None]
         return (frame._replace(bodies=tuple(bodies)) if reasons else frame), reasons
 
-    def _judge(self, frame: BodyFrame, body: BodySample, swapped: bool) -> BodySample:
-        if not body.tracked:
-            return body
-        key = _key(frame, body)
+    def _judge(self, frame: BodyFrame, key: Key, body: BodySample, swapped: bool) -> BodySample:
         history = self._histories.get(key)
         if history is None:
             if len(self._histories) >= MAX_BODIES:
@@ -91,15 +92,17 @@ class OutlierGate:
             self._moved_s[frame.source] = frame.t_s
         return body if fault is None else body._replace(tracked=False, fault=fault)
 
-    def _swapped(self, frame: BodyFrame) -> Sequence[BodySample]:
+    def _swapped(self, frame: BodyFrame, keys: Sequence[Key]) -> Sequence[BodySample]:
         """Bodies that exchanged their places in one step, as they do when a tracker confuses two of them."""
         fast: list[tuple[BodySample, Vector]] = []
-        for body in frame.bodies:
-            history = self._histories.get(_key(frame, body)) if body.tracked else None
+        for key, body in zip(keys, frame.bodies, strict=True):
+            history = self._histories.get(key) if body.tracked else None
             if history is None or not 0.0 < frame.t_s - history.t_s < CONFIRM_S:
                 continue
             if math.dist(body.p, history.sample.p) > SWAP_SPEED_M_S * (frame.t_s - history.t_s):
                 fast.append((body, history.sample.p))
+        if len(fast) < 2:
+            return ()
         return [
             one
             for one, p_one in fast
@@ -176,14 +179,10 @@ def _learn_noise(history: _History, body: BodySample) -> None:
 
 
 def _angle(one: BodySample, other: BodySample) -> float:
-    cosine = abs(sum(a * b for a, b in zip(one.q, other.q, strict=True)))
-    return 2.0 * math.acos(min(cosine, 1.0))
+    (ax, ay, az, aw), (bx, by, bz, bw) = one.q, other.q  # a loop would take four times as long
+    return 2.0 * math.acos(min(abs(ax * bx + ay * by + az * bz + aw * bw), 1.0))
 
 
 def _distance_m(one: BodySample, other: BodySample) -> float:
     """Position and rotation in one measure: the rim of a body is about a decimetre from its centre."""
     return math.dist(one.p, other.p) + 0.1 * _angle(one, other)
-
-
-def _key(frame: BodyFrame, body: BodySample) -> Key:
-    return frame.source, body.id, body.name

@@ -65,27 +65,32 @@ class PoseBuffer:
 
     def add(self, t_s: float, pose: Array | Sequence[float]) -> bool:
         """Insert a tracked pose; returns False, and changes nothing, if there is one at nearly the same instant."""
-        at = (
-            int(np.searchsorted(self.times, t_s))
-            if self._count and t_s <= self._times[self._count - 1]
-            else self._count
-        )
-        for neighbour in (at - 1, at):
-            if 0 <= neighbour < self._count and abs(self._times[neighbour] - t_s) < MIN_SPACING_S:
-                return False
+        at = self._place(t_s)
+        if at is None:
+            return False
         if self._count == len(self._times):
             self._forget()
             at -= KEEP
             if at < 0:
                 return False
-        self._times[at + 1 : self._count + 1] = self._times[at : self._count]
-        self._poses[at + 1 : self._count + 1] = self._poses[at : self._count]
+        if at < self._count:
+            self._times[at + 1 : self._count + 1] = self._times[at : self._count]
+            self._poses[at + 1 : self._count + 1] = self._poses[at : self._count]
         self._times[at], self._poses[at] = t_s, pose
         self._count += 1
         self._align(at)
         if t_s - self._estimated_s >= NOISE_EVERY_S:
             self._estimated_s, self.noise = t_s, estimate_noise(self.times, self.poses)
         return True
+
+    def _place(self, t_s: float) -> int | None:
+        """Where a sample of this time belongs; None if there is one at nearly the same instant."""
+        count = self._count
+        if not count or t_s - self._times[count - 1] >= MIN_SPACING_S:
+            return count
+        at = int(np.searchsorted(self.times, t_s))
+        near = (neighbour for neighbour in (at - 1, at) if 0 <= neighbour < count)
+        return None if any(abs(self._times[k] - t_s) < MIN_SPACING_S for k in near) else at
 
     def interval_s(self) -> float:
         """Median spacing of the newest samples; infinite before the second sample."""
