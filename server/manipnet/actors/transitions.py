@@ -51,20 +51,21 @@ class InertializationOffset:
 
     def __init__(self, size: int) -> None:
         self.offset = np.zeros(size)
+        self.is_open = False
+        """Whether the offset is not zero yet."""
         self._speed = np.zeros(size)
-        self._open = False
 
     def open(self, offset: Array) -> None:
         """Start from a new offset, at rest."""
-        self.offset, self._speed, self._open = offset, np.zeros_like(offset), True
+        self.offset, self._speed, self.is_open = offset, np.zeros_like(offset), True
 
     def change(self, offset: Array) -> None:
         """Replace the offset and keep its speed."""
-        self.offset, self._open = offset, True
+        self.offset, self.is_open = offset, True
 
     def close(self, dt_s: float, half_life_s: float) -> Array:
         """The offset `dt_s` later; about half of it closes within `half_life_s`."""
-        if not self._open:
+        if not self.is_open:
             return self.offset
         stiffness = 2.0 * math.log(2.0) / half_life_s
         pull = self._speed + stiffness * self.offset
@@ -72,7 +73,7 @@ class InertializationOffset:
         self.offset = decay * (self.offset + pull * dt_s)
         self._speed = decay * (self._speed - stiffness * pull * dt_s)
         if np.abs(self.offset).max() < CLOSED:
-            self.offset, self._speed, self._open = np.zeros_like(self.offset), np.zeros_like(self.offset), False
+            self.offset, self._speed, self.is_open = np.zeros_like(self.offset), np.zeros_like(self.offset), False
         return self.offset
 
 
@@ -128,8 +129,9 @@ class PoseTransition:
         if self._finger_source != source:
             self._finger_source = source
             self._fingers.open(shown - target)
-        half_life_s = REST_HALF_LIFE_S if angles is None else RETURN_HALF_LIFE_S
-        return self._guard.within(target + self._fingers.close(dt_s, half_life_s), shown, dt_s)
+        if self._fingers.is_open:
+            target = target + self._fingers.close(dt_s, REST_HALF_LIFE_S if angles is None else RETURN_HALF_LIFE_S)
+        return self._guard.within(target, shown, dt_s)
 
     def _next_wrist(self, shown: Array, wrist: Array | None, source: Hashable, dt_s: float) -> Array:
         if wrist is None:
@@ -140,7 +142,9 @@ class PoseTransition:
             self._wrist.open(_gap(shown, wrist))
         elif self._was_forecast:
             self._wrist.change(_gap(shown, wrist))
-        wanted = _displaced(wrist, self._wrist.close(dt_s, RETURN_HALF_LIFE_S))
+        wanted = wrist
+        if self._wrist.is_open:
+            wanted = _displaced(wrist, self._wrist.close(dt_s, RETURN_HALF_LIFE_S))
         if self._guard.is_reachable(*_distance(shown.tolist(), wanted.tolist()), dt_s):
             return wanted
         self._wrist.open(_gap(shown, wrist))
