@@ -26,15 +26,14 @@ def compile_aside() -> None:
     from manipnet.synthesis.model.features import features
     from manipnet.synthesis.model.shipped import shipped_hand
     from manipnet.synthesis.objects.distance_field import build_field
-    from manipnet.synthesis.objects.library import load_library_mesh
-    from manipnet.synthesis.objects.shape import build_shape
+    from manipnet.synthesis.objects.shape import load_shape
     from manipnet.synthesis.synthesizer import HandScene, windows_of
     from manipnet.tracking.forecast import damped_velocity
     from manipnet.tracking.pose_buffer import PoseBuffer, sample
     from manipnet.tracking.smoothing import Smoothing
 
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
-    scene = HandScene("right", still, still, still, build_shape(load_library_mesh("cube")))
+    scene = HandScene("right", still, still, still, load_shape("cube"))
     build_field(scene.shape.bvh)
     hand = shipped_hand()
     features(hand, scene.shape, windows_of([scene]), *forward_kinematics(hand, np.zeros((1, hand.angle_count))))
