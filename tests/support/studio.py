@@ -86,10 +86,9 @@ class Studio:
             assert time.monotonic() < give_up_s, "it never came to this"
         return message
 
-    def settle(self) -> None:
-        """Let the server's clock go on a little. A browser sends what is typed slightly later than clicks,
-        and only the newest field if two are changed at nearly the same time."""
-        end_s = self.server.ask({"op": "status"})["uptime_s"] + 0.3
+    def settle(self, seconds: float = 0.3) -> None:
+        """Let the server's clock go on a little, in which the browser sends what was typed."""
+        end_s = self.server.ask({"op": "status"})["uptime_s"] + seconds
         while self.server.ask({"op": "status"})["uptime_s"] < end_s:
             pass
 
