@@ -169,12 +169,12 @@ def lying_still(server: LiveServer) -> Iterator[dict[str, np.ndarray]]:
 
 
 @contextlib.contextmanager
-def studio_in(folder: Path, model: Path) -> Iterator[Studio]:
+def studio_in(folder: Path, model: Path, rig_text: str = RIG) -> Iterator[Studio]:
     """A server that keeps its rig and takes in `folder`, and its page. Skips the test where there is no Chromium."""
     if (chromium := shutil.which("chromium")) is None:
         pytest.skip("needs chromium: apt-get install chromium")
     rig, takes = folder / "stage.toml", folder / "takes"
-    rig.write_text(RIG)
+    rig.write_text(rig_text)
     options = ("--rig", str(rig), "--model", str(model), "--takes", str(takes))
     with (
         serving(*options) as server,

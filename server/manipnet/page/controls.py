@@ -1,7 +1,7 @@
 """What the panel and its tabs share: how they ask the server, run what a visitor clicked, and show what is reported."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from typing import Any, Final
 
 import viser
@@ -20,9 +20,22 @@ Perform = Callable[[Action], None]
 
 
 def by_visitor(action: Callable[[], None]) -> Callable[[viser.GuiEvent[Any]], None]:
-    """A callback for `on_update` that ignores the values this program sets itself."""
+    """A callback for `on_update` that ignores the values this program sets itself. It runs on a thread and may wait."""
 
     def changed(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None:
+            action()
+
+    return changed
+
+
+def at_once(action: Callable[[], None]) -> Callable[[viser.GuiEvent[Any]], Coroutine[Any, Any, None]]:
+    """A callback like that of `by_visitor` for an action that only sets other controls and never waits.
+
+    It runs before the visitor's next change is received, so it cannot overwrite that change.
+    """
+
+    async def changed(event: viser.GuiEvent[Any]) -> None:
         if event.client is not None:
             action()
 

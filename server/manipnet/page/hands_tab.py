@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import viser
 
-from manipnet.page.controls import Fields, Perform, by_visitor
+from manipnet.page.controls import Fields, Perform, at_once, by_visitor
 from manipnet.page.hand_choices import OWN, HandChoices
 
 NO_ACTOR: Final[tuple[str, ...]] = ("actor",)
@@ -22,7 +22,7 @@ class HandsTab:
             "Contact is solved on the chosen hand, and everybody sees it. To use an avatar of yours, drop its file on "
             "the page: **VRM**, or **GLB** with a skeleton. `manipnet hand import` says more about a file."
         )
-        self._actor.on_update(by_visitor(self._show))
+        self._actor.on_update(at_once(self._show))
         self._hand.on_update(by_visitor(lambda: perform(self._choose)))
 
     @property
@@ -43,7 +43,7 @@ class HandsTab:
         """Let the chosen actor have a hand. Raises `RefusedError`."""
         self._choices.choose(self.actor, hand, len(self._actor.options) > 1)
         self._show()
-        return f"{self.actor} has the hand {hand}"
+        return f"{self.actor} has {hand}" if hand == OWN else f"{self.actor} has the hand {hand}"
 
     def _choose(self) -> str:
         return self.use(self._hand.value)

@@ -10,7 +10,7 @@ import viser
 
 from manipnet.config.settings import SCALE_RANGE
 from manipnet.geometry import Array, quat_exp, quat_log
-from manipnet.page.controls import Ask, Fields, Perform, by_visitor
+from manipnet.page.controls import Ask, Fields, Perform, at_once, by_visitor
 from manipnet.page.frames import Frame
 from manipnet.page.gizmo import Gizmo
 from manipnet.page.markdown import escape
@@ -72,7 +72,7 @@ class ObjectsTab:
         )
         self._problems = gui.add_markdown("")
         self._stand.on_click(lambda _: self._perform(self._stand_on_sheet))
-        self._body.on_update(by_visitor(self._show_body))
+        self._body.on_update(at_once(self._show_body))
         for handle in (self._object, self._scale):
             handle.on_update(by_visitor(lambda: self._perform(self._select)))
         for handle in (self._position, self._turn):

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import viser
 
-from manipnet.page.controls import Ask, Perform, by_visitor
+from manipnet.page.controls import Ask, Perform, at_once
 from manipnet.page.markdown import escape
 from manipnet.page.playback import read_recording
 from manipnet.page.transport import Transport
@@ -49,9 +49,9 @@ class TakesTab:
         show.on_click(lambda _: perform(self._show_take))
         download.on_click(lambda _: perform(self._download))
         delete.on_click(lambda _: self._confirm_delete())
-        self._take.on_update(by_visitor(self._show_facts))
+        self._take.on_update(at_once(self._show_facts))
         for handle in (self._slate, self._number):
-            handle.on_update(by_visitor(self._name_next))
+            handle.on_update(at_once(self._name_next))
         keep.on_click(lambda _: form.submit())
         form.on_submit(lambda _: perform(self._edit))
 
