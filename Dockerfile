@@ -8,6 +8,8 @@ COPY server server
 COPY tools tools
 COPY models models
 RUN pip install --no-cache-dir -c constraints.txt . ./models
+# The first start of a container finds the kernels compiled; only a processor from before 2013 compiles its own.
+RUN MANIPNET_CACHE=/tmp/manipnet python -m manipnet.runtime.precompile && rm -r /tmp/manipnet
 
 USER manipnet
 WORKDIR /home/manipnet

@@ -192,7 +192,8 @@ def _health(status: dict[str, Any]) -> str:
     rows = ["| | body | Hz | last seen |", "|---|---|--:|--:|"]
     hands = []
     for name, actor in status["actors"].items():
-        if len(status["actors"]) > 1:
+        whose = f"{escape(name)}: " if len(status["actors"]) > 1 else ""
+        if whose:
             rows.append(f"| | **{escape(name)}** | | |")
         for body, health in actor["bodies"].items():
             carried = actor.get("objects", {}).get(body, body)
@@ -201,7 +202,7 @@ def _health(status: dict[str, Any]) -> str:
                 f"| {DOTS[health['state']]} | {label} | {health['rate_hz'] or 0.0:.0f} | {ago(health['age_s'])} |"
             )
         for side, hand in actor["hands"].items():
-            hands.append(f"{side} hand **{hand['state']}**{_on(hand['object'], actor)}")
+            hands.append(f"{whose}{side} hand **{hand['state']}**{_on(hand['object'], actor)}")
     return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, refusals_text(status.get("drops", {}))])
 
 
