@@ -3,7 +3,7 @@ FROM python:3.12-slim
 
 RUN useradd --create-home --uid 1000 manipnet
 WORKDIR /opt/manipnet
-COPY pyproject.toml constraints.txt README.md LICENSE ./
+COPY pyproject.toml hatch_build.py constraints.txt README.md LICENSE ./
 COPY server server
 COPY tools tools
 COPY models models
