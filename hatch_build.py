@@ -20,15 +20,15 @@ class KernelHook(BuildHookInterface):
         """
         package = Path(self.root, "server")
         kernels = package / "manipnet" / "kernels"
+        # an isolated build finds its libraries by the path of this interpreter only
+        program = f"""
+import runpy, sys
+sys.path[:], sys.argv[1:] = {[str(package), *sys.path]!r}, ["--into", {str(kernels)!r}]
+runpy.run_module("manipnet.runtime.precompile", run_name="__main__")
+"""
         with tempfile.TemporaryDirectory(prefix="manipnet-build-") as cache:
-            # an isolated build finds its libraries by the path of this interpreter only
-            path = os.pathsep.join([str(package), *filter(None, sys.path)])
-            result = subprocess.run(
-                [sys.executable, "-m", "manipnet.runtime.precompile", "--into", str(kernels)],
-                env=os.environ | {"PYTHONPATH": path, "MANIPNET_CACHE": cache},
-                capture_output=True,
-                text=True,
-                check=False,
-            )
+            environment = os.environ | {"MANIPNET_CACHE": cache}
+            command = [sys.executable, "-c", program]
+            result = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if result.returncode:
             self.app.display_warning(f"no compiled kernels are brought along: {result.stderr.strip()}")
