@@ -2,6 +2,7 @@
 
 import os
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,9 @@ import pytest
 import zmq
 from live_server import START_S, free_ports, serving
 from screen import Screen
+
+import manipnet
+from manipnet.common.shipped_folder import FOLDER
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo terminals of this kind")
 PATIENCE_S = 60.0
@@ -125,7 +129,10 @@ def test_a_pipe_gets_the_ready_line_and_lines_only_for_changes(tiny_bundle: Path
 
 def test_a_first_start_says_at_once_that_it_compiles(tiny_bundle: Path, tmp_path: Path) -> None:
     """It says so before the compiler is loaded, in one place, and is stopped then."""
-    server = Watched("--model", str(tiny_bundle), MANIPNET_CACHE=str(tmp_path / "empty"))
+    package, without = Path(manipnet.__file__).parent, shutil.ignore_patterns("__pycache__", FOLDER)
+    shutil.copytree(package, tmp_path / "site" / "manipnet", ignore=without)  # an installation without kernels
+    environment = {"MANIPNET_CACHE": str(tmp_path / "empty"), "PYTHONPATH": str(tmp_path / "site")}
+    server = Watched("--model", str(tiny_bundle), **environment)
     try:
         watched_for = "first start: code is compiled once"
         server.until(lambda: f"{watched_for}, which takes some seconds: 1 s so far" in server.raw)
