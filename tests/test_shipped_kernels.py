@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core import config
 
 import manipnet
+from manipnet.common.kernel_target import choose_target
 from manipnet.common.shipped_folder import FOLDER, brings_kernels, interpreter_and_platform
 from manipnet.common.shipped_kernels import can_ship, ship, use_shipped
 from manipnet.jit import ship_kernels
@@ -67,6 +69,12 @@ def test_kernels_go_into_an_empty_cache_only_and_old_ones_are_not_shipped(tmp_pa
     (folder_of(package / "tracking", empty) / "a.f-1.nbi").write_bytes(b"3")
     use_shipped(package, "new", empty)
     assert (folder_of(package / "tracking", empty) / "a.f-1.nbi").read_bytes() == b"3"
+
+
+def test_the_target_stays_the_same_and_can_be_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert choose_target() == choose_target()
+    monkeypatch.setattr(config, "CPU_NAME", "generic")
+    assert choose_target().startswith("generic ")
 
 
 def folder_of(sources: Path, cache: Path) -> Path:

@@ -19,13 +19,15 @@ _FEATURES: Final = (
 
 
 def choose_target() -> str:
-    """Let numba compile for the portable target where possible; returns what it compiles for, `host` if it is this very
-    processor. `NUMBA_CPU_NAME` in the environment takes precedence.
+    """Let numba compile for the portable target where possible, else for this very processor; returns which it is.
+
+    `NUMBA_CPU_NAME` in the environment takes precedence.
     """
     if config.CPU_NAME:  # pyright: ignore[reportAttributeAccessIssue]: set at run time
-        return config.CPU_NAME  # pyright: ignore[reportAttributeAccessIssue]
-    has = {name for name, present in llvm.get_host_cpu_features().items() if present}
+        return f"{config.CPU_NAME} {config.CPU_FEATURES}"  # pyright: ignore[reportAttributeAccessIssue]
+    features = llvm.get_host_cpu_features()
+    has = {name for name, present in features.items() if present}
     if platform.machine() not in ("x86_64", "AMD64") or not has.issuperset(_FEATURES):
-        return "host"
+        return f"{llvm.get_host_cpu_name()} {features.flatten()}"
     config.CPU_NAME, config.CPU_FEATURES = PORTABLE, ""  # pyright: ignore[reportAttributeAccessIssue]
-    return PORTABLE
+    return f"{PORTABLE} "

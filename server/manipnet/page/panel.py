@@ -150,9 +150,11 @@ class Panel:
         if (shown := self._view.recording) is not None:
             return html.take_line(shown.name, shown.seconds)
         detail = state.detail
-        if self._show.live and history.rate_hz(time.monotonic()):
+        if state.level != "bad" and self._show.live and history.rate_hz(time.monotonic()):
             latency = next(iter(self._show.live.values())).message.latency_ms
-            detail += f" · {latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms processing"
+            processing = latency.total - latency.buffer
+            processing_text = f"{processing:.1f}" if processing < 10.0 else f"{processing:.0f}"
+            detail += f" · {latency.buffer:.0f} ms look-ahead + {processing_text} ms processing"
         return html.state_line(state, detail)
 
     def _controls(self, gui: viser.GuiApi) -> None:

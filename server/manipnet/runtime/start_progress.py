@@ -13,7 +13,7 @@ from manipnet.common.shipped_folder import brings_kernels
 
 STEP_S: Final = 1.0
 LOG_S: Final = 5.0
-TEXT: Final = "first start: code is compiled once, which takes some seconds"
+TEXT: Final = "first start: code is compiled once, which takes 10 to 30 seconds"
 
 
 class StartProgress:

@@ -27,7 +27,7 @@ def main() -> None:
                 build_shape(mesh, Path(made))
         for file in sorted(Path(made).iterdir()):
             path = PREBUILT_FOLDER / file.name
-            with np.load(file) as arrays:
+            with np.load(file, allow_pickle=False) as arrays:
                 np.savez_compressed(path, allow_pickle=False, **arrays)
             print(f"{path}: {path.stat().st_size} bytes")
 
