@@ -227,6 +227,7 @@ def browsing(chromium: str, url: str, profile: Path) -> Iterator[Page]:
 def another(page: Page) -> Iterator[Page]:
     """A second page of the same browser, which shows what the first one shows."""
     devtools = page.debugger.split("/devtools/")[0]
+    page.evaluate("document.activeElement.blur()")  # a list opens again when its window gets the focus back
     target = page.call("Target.createTarget", url=page.evaluate("location.href"))["targetId"]
     try:
         with connect(f"{devtools}/devtools/page/{target}", max_size=None) as connection:

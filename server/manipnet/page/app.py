@@ -67,9 +67,10 @@ class Page:
             elif what == "frame":
                 self._show.add_frame(content)
 
-    def dropped(self, name: str, content: bytes) -> str:
-        """Import a mesh or an avatar that was dropped on the page; returns the message for its visitor."""
-        panel = next((panel for panel in self._panels.values() if panel.objects is not None), None)
+    def dropped(self, name: str, content: bytes, visitor: str) -> str:
+        """Import a mesh or an avatar for the actor or body that the visitor has chosen; returns a message for him."""
+        operators = {str(number): panel for number, panel in self._panels.items() if panel.objects is not None}
+        panel = operators.get(visitor) or next(iter(operators.values()), None)
         if panel is None or panel.objects is None:
             return "only a browser on the server's own machine may import files, and none is open"
         try:

@@ -21,7 +21,9 @@ function notify(text) {
 
 function importFile(file) {
   const scheme = location.protocol === "https:" ? "wss" : "ws";
-  const socket = new WebSocket(`${scheme}://${location.host}/drop?name=${encodeURIComponent(file.name)}`);
+  const visitor = document.querySelector(".mn-big")?.dataset.visitor ?? "";
+  const about = new URLSearchParams({ name: file.name, visitor });
+  const socket = new WebSocket(`${scheme}://${location.host}/drop?${about}`);
   notify(`importing ${file.name} …`);
   socket.onopen = async () => socket.send(await file.arrayBuffer());
   socket.onmessage = (event) => notify(event.data);

@@ -14,8 +14,8 @@ from manipnet.page.take_view import TakeView
 PLAY_HZ: Final = 30.0
 STEP_S: Final = 1.0 / 60.0
 """What an arrow key moves a take by: one tick."""
-MARK: Final = '<div class="mn-{name}"></div>'
-"""An empty element by which the style sheet finds the button that follows it."""
+MARK: Final = '<div class="mn-big" data-visitor="{visitor}"></div>'
+"""An empty element by which the style sheet finds the button that follows it, and the script whose page it is."""
 
 
 class Transport:
@@ -29,7 +29,7 @@ class Transport:
         """What the next recording is called: some of `name`, `slate`, `number` and `note`."""
         gui = client.gui
         if operator:
-            gui.add_html(MARK.format(name="big"))
+            gui.add_html(MARK.format(visitor=client.client_id))
             self._record = gui.add_button("Record", icon=viser.Icon.PLAYER_RECORD, color="red", hint="key R")
             self._record.on_click(lambda _: perform(self._toggle_record))
             self._key(gui, "Record", "R", self._toggle_record)

@@ -41,7 +41,7 @@ DROP_S: Final = 30.0
 _POLICY_VIOLATION: Final = 1008
 _TRY_AGAIN_LATER: Final = 1013
 
-Dropped = Callable[[str, bytes], str]
+Dropped = Callable[[str, bytes, str], str]
 _log = logging.getLogger(__name__)
 
 
@@ -56,7 +56,8 @@ class PageServer(viser.ViserServer):
 def open_server(listener: socket.socket, label: str, dropped: Dropped) -> PageServer:
     """Serve on a socket that already listens; on loopback, only pages of this machine may connect.
 
-    `dropped` receives the name and content of a file that an operator dropped on the page, and returns a message.
+    `dropped` receives the name and content of a file that an operator dropped on the page, and the number by which the
+    page knows this operator; it returns a message.
     """
     with _served_on(listener, dropped):
         return PageServer(host="127.0.0.1", port=0, label=label, verbose=False)
@@ -146,11 +147,12 @@ async def _take_in(connection: ServerConnection, request: Request, dropped: Drop
     if len(taking) >= MAX_DROPS:
         await connection.close(_TRY_AGAIN_LATER, f"at most {MAX_DROPS} files at a time")
         return
-    name = parse_qs(urlsplit(request.path).query).get("name", ["mesh"])[0]
+    query = parse_qs(urlsplit(request.path).query)
+    name, visitor = (query.get(key, [default])[0] for key, default in (("name", "mesh"), ("visitor", "")))
     taking.add(connection)
     try:
         with contextlib.suppress(ConnectionClosed, TimeoutError):
             content = await asyncio.wait_for(connection.recv(decode=False), DROP_S)
-            await connection.send(await asyncio.to_thread(dropped, name, content))
+            await connection.send(await asyncio.to_thread(dropped, name, content, visitor))
     finally:
         taking.remove(connection)
