@@ -74,6 +74,7 @@ def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> N
     studio.until(lambda _: list(studio.takes.glob("take *.mcap")))
     (dated,) = studio.takes.glob("take *.mcap")
     dated.rename(studio.takes / "spare.mcap")
+    page.wait_for(NAMED % "spare", PATIENCE_S)  # a list that changed under the mouse would be missed
 
 
 def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
