@@ -191,7 +191,9 @@ def shifted_grasp(tables: Tables, space: Space, grasp: Grasp, rng: Generator) ->
     place = grasp.place + rng.normal(0.0, SHIFT_M, 3)
     stiff = np.concatenate([np.full(20, 1.0 / 0.3), np.full(6, 1e6)])
     stiff[5::4] = 1.0 / 0.12
-    angles = settle(space, tables.body, grasp.angles, turn, place, grasp.touching.astype(float), stiff, _ROUNDS)[:20].copy()
+    angles = settle(space, tables.body, grasp.angles, turn, place, grasp.touching.astype(float), stiff, _ROUNDS)[
+        :20
+    ].copy()
     gaps, _, _, clear = look(space, tables.body, angles, turn, place)
     touched = np.any(grasp.touching[4:].reshape(5, 3), axis=1)
     off = np.min(gaps[4:].reshape(5, 3), axis=1)[touched].max(initial=0.0) > 2.0 * TOUCH_M
