@@ -54,6 +54,8 @@ def blended_poses(hand: Hand, captured: Array, pool: Array, rng: np.random.Gener
 def drawn_slides(count: int, share: float, rng: np.random.Generator) -> Array:
     """Velocities `(count, 2, 6)` of objects that move in the hand, before and after the present: metres and radians per
     second along and about each axis of the object. They are zero for all but this share."""
+    if not share:
+        return np.zeros((count, 2, 6))
     moving = rng.random((count, 1, 1)) < share
     return moving * rng.normal(0.0, [*3 * (SLIDE_M_S,), *3 * (TURN_RAD_S,)], (count, 2, 6))
 
@@ -61,9 +63,11 @@ def drawn_slides(count: int, share: float, rng: np.random.Generator) -> Array:
 def with_slides(windows: Windows, slides: Array) -> Windows:
     """The same windows, but the objects move at the velocities `slides (N, 2, 6)` too; at present all is where it was.
 
-    Generated hands keep to their grasps, so that any other motion of an object in the hand means that it reaches or lets
-    go. A person also turns and pushes an object in the hand.
+    Generated hands keep to their grasps, so that any motion of an object in a hand would mean that the hand reaches or
+    lets go. A person also turns and pushes an object in the hand.
     """
+    if not slides.any():
+        return windows
     past, future = np.minimum(WINDOW_OFFSETS_S, 0.0), np.maximum(WINDOW_OFFSETS_S, 0.0)
     moved = past[:, None] * slides[:, :1] + future[:, None] * slides[:, 1:]
     motion = np.concatenate([moved[..., :3], quat_exp(moved[..., 3:])], axis=-1)
