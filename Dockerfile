@@ -3,11 +3,13 @@ FROM python:3.12-slim
 
 RUN useradd --create-home --uid 1000 manipnet
 WORKDIR /opt/manipnet
-COPY pyproject.toml constraints.txt README.md LICENSE ./
+COPY pyproject.toml hatch_build.py constraints.txt README.md LICENSE ./
 COPY server server
 COPY tools tools
 COPY models models
 RUN pip install --no-cache-dir -c constraints.txt . ./models
+# The first start of a container finds the kernels compiled; only a processor from before 2013 compiles its own.
+RUN MANIPNET_CACHE=/tmp/manipnet python -m manipnet.runtime.precompile && rm -r /tmp/manipnet
 
 USER manipnet
 WORKDIR /home/manipnet

@@ -17,6 +17,7 @@ FREE_PORTS = [f"--{name}-port=0" for name in ("input", "control", "osc", "page",
 START_S = 300.0
 LARGEST_WHEEL_MB = 15
 LICENCES = ("License-Expression: Apache-2.0 AND CC-BY-NC-4.0", "License-File: LICENSE", "License-File: models/LICENSE")
+COMPILED = "from manipnet.jit import cached; from manipnet.runtime.precompile import SENSING; print(cached(SENSING))"
 METADATA = "from importlib.metadata import distribution; print(distribution('manipnet-live').read_text('METADATA'))"
 
 
@@ -35,6 +36,8 @@ def main(wheel: str, full_width_wheel: str) -> None:
         assert not missing, f"the wheel's metadata lacks {missing}"
         for arguments in (["--help"], ["doctor", "--help"], ["replay", "--help"]):
             subprocess.run([programs / "manipnet", *arguments], stdout=subprocess.DEVNULL, check=True, cwd=folder)
+        found = subprocess.run([python, "-c", COMPILED], stdout=subprocess.PIPE, text=True, check=True).stdout
+        assert found.strip() == "True", "the wheel brings no kernels for this computer, or they are not used"
         program, *arguments = container.command()
         start_demo([str(programs / program), *arguments, *FREE_PORTS], folder)
         add_full_width(programs, full_width_wheel)

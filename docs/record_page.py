@@ -1,8 +1,9 @@
 """Record the pictures of the live page: `python docs/record_page.py [NAME …]` rewrites `docs/images/NAME.webp`.
 
 A real server plays its demo and records it. A headless Chromium then opens the recording on the page and steps through
-it picture by picture, so that the result runs at the true speed although the browser draws in software. It needs
-Chromium and the extra `dev`, and takes some minutes.
+it picture by picture, so that the result runs at the true speed although the browser draws in software. The pictures
+`page-light` and `page-waiting` are instants of a live page, for which the computer should have nothing else to do. It
+needs Chromium and the extra `dev`, and takes some minutes.
 """
 
 import base64
@@ -55,11 +56,46 @@ CLIPS = {
 }
 
 
+LIVE = ("page-light", "page-waiting")
+LIVE_WINDOW = (1280, 800)
+
+
 def main(names: list[str]) -> None:
-    """Record, step through the recording, and write the pictures with these names."""
+    """Write the pictures with these names; without a name, all of them."""
+    for name in [name for name in names or LIVE if name in LIVE]:
+        write_live(name)
+    names = [name for name in names or CLIPS if name not in LIVE]
+    write_clips(names)
+
+
+def write_live(name: str) -> None:
+    """Write an instant of a live page: one that records in the light theme, or one that waits for bodies."""
+    options = ("--demo",) if name == "page-light" else ("--mesh", "mug=mug")
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        serving(*options, "--takes", f"{folder}/takes") as server,
+        browsing("chromium", server.addresses["page"], Path(folder) / "profile") as page,
+    ):
+        width, height = LIVE_WINDOW
+        page.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        if name == "page-light":
+            page.click("Light theme", PATIENCE_S)
+            page.tick("Contacts")
+            time.sleep(DEMO_S - 10.0)  # the charts forget the start
+            page.click("Record")
+            page.wait_for(f"{TEXT}.includes('REC 0:09') && {TEXT}.includes('● Live')", PATIENCE_S)
+        else:
+            page.wait_for(f"{TEXT}.includes('nothing arrives at all')", PATIENCE_S)
+        page.evaluate(DISMISS)
+        time.sleep(1.0)
+        screenshot(page).save(DOCS / "images" / f"{name}.webp", quality=78, method=6)
+
+
+def write_clips(names: list[str]) -> None:
+    """Record the demo, step through the recording, and write the pictures with these names."""
     takes = Path(tempfile.gettempdir()) / "takes"  # the page shows its name
     file = takes / f"{TAKE}.mcap"
-    for options, group in groupby(names or CLIPS, key=lambda name: CLIPS[name].options):
+    for options, group in groupby(names, key=lambda name: CLIPS[name].options):
         file.unlink(missing_ok=True)
         with serving("--demo", *options, "--takes", str(takes)) as server:
             record(server)
@@ -119,13 +155,18 @@ def show(page: Page, second: float, wait_s: float) -> None:
 
 def picture(page: Page, clip: Clip) -> Image.Image:
     """What the page looks like."""
-    screenshot = base64.b64decode(page.call("Page.captureScreenshot")["data"])
-    image = Image.open(io.BytesIO(screenshot)).convert("RGB")
+    image = screenshot(page)
     if not clip.whole:
         left, top, width, _ = page.evaluate(PLACE)
         high = width * clip.shown[1] / clip.shown[0]  # what is below shows only the table
         image = image.crop((round(left), round(top), round(left + width), round(top + high)))
     return image.resize(clip.shown, Image.Resampling.LANCZOS)
+
+
+def screenshot(page: Page) -> Image.Image:
+    """The whole window."""
+    content = base64.b64decode(page.call("Page.captureScreenshot")["data"])
+    return Image.open(io.BytesIO(content)).convert("RGB")
 
 
 if __name__ == "__main__":

@@ -157,6 +157,21 @@ def test_the_mailbox_keeps_the_newest_frames_and_counts_the_others() -> None:
     assert mailbox.wait(0.0) == []
 
 
+def test_frames_before_the_awaited_one_do_not_end_the_wait() -> None:
+    mailbox = Mailbox(Telemetry())
+
+    class Awaited(dict[str, float]):
+        def __bool__(self) -> bool:
+            sending.start()  # it waits for the lock until `wait` waits
+            return True
+
+    for source, sent in (("zmq", [1.0, 2.0, 5.0]), ("another", [1.0])):
+        frames = [a_frame(t_s)._replace(source=source) for t_s in sent]
+        sending = threading.Thread(target=lambda frames=frames: [mailbox.put(frame) for frame in frames])
+        assert mailbox.wait(60.0, Awaited(zmq=5.0)) == frames
+        sending.join()
+
+
 def test_a_question_is_answered_on_the_tick_thread() -> None:
     mailbox, answers = Mailbox(Telemetry()), []
     asking = threading.Thread(target=lambda: answers.append(mailbox.ask(threading.get_ident, timeout_s=20.0)))

@@ -2,7 +2,8 @@
 
 Numba caches compiled code per function and renews it when the file of that function changes, but not when a constant or
 a function that it uses changes. So the cache folder is named after the state of the whole package, and an update never
-runs stale machine code. The folder belongs to the user, so a read-only installation is cached too.
+runs stale machine code. The folder belongs to the user, so a read-only installation is cached too. It begins with the
+kernels that the installation brings along, if it does.
 
 With `NUMBA_DISABLE_JIT=1` in the environment nothing is compiled and every kernel is a Python function that a debugger
 can step through, many times slower.
@@ -14,6 +15,8 @@ import logging
 import math
 import os
 import shutil
+import sys
+import sysconfig
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,6 +25,7 @@ from typing import Any, Final
 
 os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")  # colours every candidate that it rejects
 
+import llvmlite
 import numba
 import numpy as np
 from numba import njit, types
@@ -31,8 +35,9 @@ from numba.np.arrayobj import make_array, populate_array
 from numba.np.numpy_support import as_dtype
 from platformdirs import user_cache_dir
 
-from manipnet.common import kernel_cache
+from manipnet.common import kernel_cache, shipped_kernels
 from manipnet.common.kernel_compiler import KernelCompiler, inner_function
+from manipnet.common.kernel_target import choose_target
 
 _OPTIONS: Final[dict[str, Any]] = {"nogil": True, "error_model": "numpy", "_nrt": False}
 kernel = njit(cache=True, pipeline_class=KernelCompiler, **_OPTIONS)
@@ -87,6 +92,7 @@ COMPILED = ("geometry.py", "synthesis", "tracking")
 """Where compiled functions are, and the constants that are compiled into them; nothing else is part of the state."""
 
 _KEEP_S = 7 * 86400.0
+_PACKAGE: Final = Path(__file__).parent
 
 
 @contextmanager
@@ -112,13 +118,25 @@ def seal_cache() -> None:
         kernel_cache.seal_cache(_own_folder)
 
 
+def ship_kernels(into: Path) -> int:
+    """Write all kernels that are in the cache below a folder, from which an installation takes them.
+
+    Returns the number of files. Raises `OSError` and `ValueError`.
+    """
+    if _own_folder is None or not shipped_kernels.can_ship():
+        raise ValueError("kernels can only be shipped from a cache of our own, made by numba 0.68 or later")
+    return shipped_kernels.ship(_PACKAGE, _package_state(), _own_folder, into)
+
+
 def _package_state() -> str:
-    package = Path(__file__).parent
-    digest = hashlib.sha256(numba.__version__.encode())
-    files = (p for part in COMPILED for p in (package / part, *(package / part).rglob("*")))
+    """A name for everything on which compiled code depends: sources, compiler, interpreter and processor."""
+    compiler, interpreter = (numba.__version__, llvmlite.__version__), sys.implementation.cache_tag
+    about = *compiler, interpreter, sysconfig.get_platform(), choose_target()
+    digest = hashlib.sha256(repr(about).encode())
+    parts = (*COMPILED, "jit.py", "common/kernel_compiler.py")
+    files = (p for part in parts for p in (_PACKAGE / part, *(_PACKAGE / part).rglob("*")))
     for path in sorted(p for p in files if p.suffix == ".py"):
-        stat = path.stat()
-        digest.update(f"{path.relative_to(package)} {stat.st_size} {stat.st_mtime_ns}".encode())
+        digest.update(path.relative_to(_PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -127,13 +145,16 @@ def _use_own_cache() -> Path | None:
     if os.environ.get("NUMBA_CACHE_DIR"):
         return None
     root = Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False)) / "kernels"
-    folder = root / _package_state()
+    state = _package_state()
+    path = hashlib.sha256(str(_PACKAGE).encode())  # numba names folders after the path of the sources
+    folder = root / f"{state}-{path.hexdigest()[:8]}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
         for old in root.iterdir():
             if time.time() - old.stat().st_mtime > _KEEP_S:
                 shutil.rmtree(old, ignore_errors=True)
+        shipped_kernels.use_shipped(_PACKAGE, state, folder)
         kernel_cache.check_cache(folder)
     except OSError as error:
         _log.warning("the folder %s cannot be used for compiled code (%s); numba chooses another one", folder, error)

@@ -12,6 +12,8 @@ from manipnet.geometry import Side
 from manipnet.page.overlays import OVERLAYS
 from manipnet.wire import HandsMessage
 
+RECORD_TOP = """
+[...document.querySelectorAll('button')].find(one => one.textContent.trim() === 'Record').getBoundingClientRect().top"""
 CORNERS = [(x, y, z) for x in (-2, 2) for y in (-6, 6) for z in (-2, 2)]
 SIDES = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
 PESTLE = "".join([*(f"v {x} {y} {z}\n" for x, y, z in CORNERS), *(f"f {side}\n" for side in SIDES)])
@@ -23,9 +25,11 @@ def test_pause_go_on_and_rest(studio: Studio) -> None:
         return lambda message: {hand.state for hand in message.hands.values()} == {state}
 
     studio.until(are("live"))
+    top = studio.page.evaluate(RECORD_TOP)
     studio.page.click("Pause")
     studio.until(are("hold"))
     studio.says("Paused")
+    assert studio.page.evaluate(RECORD_TOP) == top, "buttons must not move under the mouse when the state changes"
     studio.page.click("Resume", PATIENCE_S)
     studio.until(are("live"))
     studio.page.click("Rest")

@@ -1,20 +1,23 @@
-"""Takes on the live page: recorded, shown, described, renamed and downloaded in a real browser."""
+"""Takes on the live page: recorded, shown, described, downloaded, renamed and deleted in a real browser."""
 
 import json
 
 from browser import another
 from studio import PATIENCE_S, SECOND, TEXT, Studio
 
+from manipnet.page.takes_tab import LOOK_EVERY_S
 from manipnet.recording.mcap_file import read_hands
 
+LAYER = "+getComputedStyle(document.querySelector('%s')).zIndex"
+"""How near to the viewer an element is drawn."""
 NAMED = "[...document.querySelectorAll('input')].filter(one => one.value === '%s').length"
 
 
 def test_a_take_is_recorded_with_keys_and_shown_to_one_visitor_only(studio: Studio) -> None:
     page = studio.page
     studio.open("Takes")
-    page.type("Slate", "12A")
-    page.type("Number", "3")
+    page.type("Slate", "", enter=False)
+    page.keys("1", "2", "A", "Tab", "3")  # a browser that was busy catches up with what was typed
     studio.says("Record makes: 12A take 3")
     page.type("Number", "1")
     studio.says("Record makes: 12A take 1")
@@ -59,6 +62,13 @@ def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> N
     studio.says("Record makes: take, with date and time")
     page.click("Record")
     page.wait_for("document.querySelector('.mn-recording') !== null", PATIENCE_S)
+    take = studio.server.ask({"op": "recordings"})["recording"]["name"]
+    page.choose("Take", take)
+    page.wait_for(NAMED % take.removesuffix(".mcap"), PATIENCE_S)
+    page.type("Note", "so far", field="textarea", enter=False)
+    studio.settle(LOOK_EVERY_S + 1.0)  # the file grows, and the page looks at it
+    assert page.evaluate("[...document.querySelectorAll('textarea')].some(one => one.value === 'so far')")
+    page.click("Next take")  # leaves the field
     page.key("r")
     page.wait_for("document.querySelector('.mn-recording') === null", PATIENCE_S)
     studio.until(lambda _: list(studio.takes.glob("take *.mcap")))
@@ -69,7 +79,8 @@ def test_the_record_button_begins_a_recording_and_r_ends_it(studio: Studio) -> N
 def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
     page = studio.page
     studio.open("Takes")
-    page.wait_for("[...document.querySelectorAll('input')].some(one => one.value.startsWith('12A take 1'))", PATIENCE_S)
+    page.choose("Take", "12A take 1.mcap")
+    page.wait_for(NAMED % "12A take 1", PATIENCE_S)
     page.type("Note", "ran r r", field="textarea", enter=False)
     page.key("r")
     studio.settle()
@@ -78,7 +89,7 @@ def test_keys_do_nothing_while_somebody_types(studio: Studio) -> None:
     assert studio.server.ask({"op": "recordings"})["recording"] is None
 
 
-def test_a_take_is_described_renamed_and_downloaded(studio: Studio) -> None:
+def test_a_take_is_described_downloaded_renamed_and_deleted(studio: Studio) -> None:
     page = studio.page
     studio.open("Takes")
     page.choose("Take", "spare.mcap")
@@ -87,7 +98,7 @@ def test_a_take_is_described_renamed_and_downloaded(studio: Studio) -> None:
     page.wait_for(NAMED % "12A take 1", PATIENCE_S)
     for field, text in {"Name": "best of all", "Its slate": "12B", "Its number": "3"}.items():
         page.type(field, text, enter=False)
-        studio.settle()
+    studio.settle()
     assert not list(studio.takes.glob("b*"))  # not renamed letter by letter
     page.click("Keep changes")
     studio.until(lambda _: notes_of(studio, "best of all") == {"slate": "12B", "number": 3, "note": "ran r rr"})
@@ -95,6 +106,14 @@ def test_a_take_is_described_renamed_and_downloaded(studio: Studio) -> None:
     page.click("Download")
     copy = studio.rig.parent / "best of all.mcap"
     studio.until(lambda _: copy.exists() and copy.stat().st_size == (studio.takes / copy.name).stat().st_size)
+    page.click("Delete …")
+    studio.says("cannot be brought back")
+    assert page.evaluate(f"{LAYER % '.mantine-Notifications-root'} < {LAYER % '.mantine-Modal-overlay'}")
+    page.click("Keep it", PATIENCE_S)
+    page.wait_for(f"!{TEXT}.includes('cannot be brought back')", PATIENCE_S)
+    page.click("Delete …")
+    page.click("Delete it", PATIENCE_S)
+    studio.until(lambda _: [file.name for file in studio.takes.iterdir()] == ["spare.mcap"])
 
 
 def notes_of(studio: Studio, take: str) -> dict:

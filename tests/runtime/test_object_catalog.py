@@ -20,7 +20,7 @@ from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.objects import shape_cache
 from manipnet.synthesis.objects.library import library_names
 from manipnet.synthesis.objects.mesh import MeshError
-from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.objects.shape import Shape, load_shape
 from manipnet.telemetry import Telemetry
 from manipnet.wire.bodies import BodyFrame, BodySample
 
@@ -57,7 +57,7 @@ def test_the_library_is_complete() -> None:
 
 
 def test_a_folder_adds_to_the_library_and_comes_before_it(folder: Path) -> None:
-    catalog = ObjectCatalog(folder, "cm")
+    catalog = ObjectCatalog(folder, "cm", load_shape)
     assert set(catalog.names()) == LIBRARY
     box(folder / "crate.stl", 7.0)
     box(folder / "cube.obj", 9.0)
@@ -71,7 +71,7 @@ def test_a_folder_adds_to_the_library_and_comes_before_it(folder: Path) -> None:
 
 
 def test_files_of_the_folder_that_are_no_objects_are_named_with_the_reason(folder: Path) -> None:
-    catalog = ObjectCatalog(folder)
+    catalog = ObjectCatalog(folder, build=load_shape)
     box(folder / "cup.obj", 0.05)
     box(folder / "cup.ply", 0.06)
     (folder / "mug.fbx").touch()
@@ -86,7 +86,7 @@ def test_files_of_the_folder_that_are_no_objects_are_named_with_the_reason(folde
 def test_a_rigs_mesh_comes_before_the_folders(folder: Path, tmp_path: Path) -> None:
     box(folder / "crate.stl", 0.05)
     box(tmp_path / "crate.stl", 0.08)
-    catalog = ObjectCatalog(folder)
+    catalog = ObjectCatalog(folder, build=load_shape)
     shape = catalog.load(tmp_path / "crate.stl")
     assert catalog.shape("crate") is shape
     assert catalog.add(folder / "crate.stl") is catalog.shape("crate"), "an added file comes first"
@@ -95,7 +95,7 @@ def test_a_rigs_mesh_comes_before_the_folders(folder: Path, tmp_path: Path) -> N
 def test_a_changed_file_is_built_again_once_nobody_is_writing_it(folder: Path) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
-    catalog = ObjectCatalog(folder)
+    catalog = ObjectCatalog(folder, build=load_shape)
     old = catalog.shape("crate")
     assert catalog.changed() == []
     box(path, 0.06)
@@ -118,7 +118,7 @@ def test_a_changed_file_is_built_again_once_nobody_is_writing_it(folder: Path) -
 def test_a_file_that_becomes_invalid_is_named_and_its_shape_stays(folder: Path, content: bytes, caplog) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
-    catalog = ObjectCatalog(folder)
+    catalog = ObjectCatalog(folder, build=load_shape)
     old = catalog.shape("crate")
     path.write_bytes(content)
     assert (catalog.changed(), catalog.changed()) == ([], [])
@@ -134,7 +134,7 @@ def test_a_file_that_becomes_invalid_is_named_and_its_shape_stays(folder: Path, 
 def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     path, done, tries = folder / "crate.ply", threading.Event(), []
     box(path, 0.05)
-    catalog = ObjectCatalog(folder)
+    catalog = ObjectCatalog(folder, build=load_shape)
     catalog.shape("crate")
 
     def swap(old, new) -> None:
@@ -151,12 +151,18 @@ def test_the_watch_goes_on_until_a_swap_is_accepted(folder: Path) -> None:
     assert len(tries) == 2
 
 
-def test_a_large_file_is_prepared_by_another_process(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_was_never_read_is_prepared_by_another_process(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
-    here = make_shape(path, "m", 2.0)
-    monkeypatch.setattr(shape_process, "LARGE_BYTES", 0)
+    here = load_shape(path, "m", 2.0)
+    monkeypatch.setenv("MANIPNET_CACHE", str(tmp_path / "empty"))
     there = make_shape(path, "m", 2.0)
+    monkeypatch.setattr(shape_process, "ChildProcess", None)
+    again = make_shape(path, "m", 2.0)
+    assert again.content_hash == here.content_hash
+    monkeypatch.undo()
     assert (there.name, there.content_hash) == (here.name, here.content_hash)
     np.testing.assert_array_equal(there.mesh.vertices, here.mesh.vertices)
     np.testing.assert_array_equal(there.mesh.faces, here.mesh.faces)
@@ -201,7 +207,7 @@ class Scene:
 
 
 def test_two_objects_one_in_each_hand_at_the_same_time(bundle: Bundle) -> None:
-    catalog = ObjectCatalog()
+    catalog = ObjectCatalog(build=load_shape)
     scene = Scene(bundle, catalog)
     scene.actor.carry("pot", "sphere", catalog.shape("sphere"), 1.5)
     plan = scene.tick(left=-0.12, right=0.12)
@@ -229,7 +235,7 @@ def test_a_hand_turns_to_another_object_only_when_it_is_clearly_nearer(bundle: B
 def test_the_next_tick_uses_a_swapped_or_changed_shape(bundle: Bundle, folder: Path) -> None:
     path = folder / "crate.ply"
     box(path, 0.05)
-    catalog = ObjectCatalog(folder)
+    catalog = ObjectCatalog(folder, build=load_shape)
     scene = Scene(bundle, catalog)
     assert scene.tick(-0.3, 0.1).scenes["right"].shape.name == "cube"
     crate = catalog.shape("crate")
@@ -253,7 +259,7 @@ def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> Non
         if path.stem == "crate":  # as if it were a huge mesh
             begun.set()
             finish.wait(60.0)
-        return make_shape(path, unit, scale)
+        return load_shape(path, unit, scale)
 
     catalog = ObjectCatalog(folder, build=build)
     scene = Scene(bundle, catalog)
@@ -272,7 +278,7 @@ def test_ticks_go_on_while_a_shape_is_built(bundle: Bundle, folder: Path) -> Non
 
 
 def test_added_objects_that_nobody_carries_are_given_back(tmp_path: Path) -> None:
-    catalog = ObjectCatalog()
+    catalog = ObjectCatalog(build=load_shape)
     box(tmp_path / "rig.stl", 0.05)
     rig_hash = catalog.load(tmp_path / "rig.stl").content_hash
     box(tmp_path / "held.stl", 0.06)
@@ -291,7 +297,7 @@ def test_added_objects_that_nobody_carries_are_given_back(tmp_path: Path) -> Non
 
 
 def test_large_shapes_that_nobody_carries_take_the_places_of_more_small_ones(tmp_path: Path, monkeypatch) -> None:
-    catalog = ObjectCatalog()
+    catalog = ObjectCatalog(build=load_shape)
     box(tmp_path / "first.stl", 0.05)
     triangles = len(catalog.add(tmp_path / "first.stl").mesh.faces)
     monkeypatch.setattr(object_catalog, "MAX_UNUSED_TRIANGLES", 3 * triangles)
@@ -308,7 +314,7 @@ def test_large_shapes_that_nobody_carries_take_the_places_of_more_small_ones(tmp
 
 
 def test_a_shape_that_is_requested_again_is_kept(tmp_path: Path) -> None:
-    catalog = ObjectCatalog()
+    catalog = ObjectCatalog(build=load_shape)
     box(tmp_path / "first.stl", 0.05)
     catalog.add(tmp_path / "first.stl")
     for i in range(2 * MAX_UNUSED):
@@ -319,13 +325,14 @@ def test_a_shape_that_is_requested_again_is_kept(tmp_path: Path) -> None:
 
 def test_the_folder_of_cached_shapes_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MANIPNET_CACHE", str(tmp_path / "cache"))
-    catalog = ObjectCatalog()
+    catalog = ObjectCatalog(build=load_shape)
     box(tmp_path / "first.stl", 0.05)
     catalog.add(tmp_path / "first.stl")
-    (first,) = (tmp_path / "cache").glob("*.npz")
+    first, first_mesh = sorted((tmp_path / "cache").glob("*.npz"), key=lambda file: file.name.startswith("mesh-"))
     monkeypatch.setattr(shape_cache, "MAX_FOLDER_BYTES", int(3.5 * first.stat().st_size))
     for i in range(4):
         box(tmp_path / f"more{i}.stl", 0.07 + 1e-3 * i)
         catalog.add(tmp_path / f"more{i}.stl")
-    assert 1 <= len(list((tmp_path / "cache").glob("*.npz"))) <= 4
+    assert 1 <= len(list((tmp_path / "cache").glob("[!m]*.npz"))) <= 4
     assert not first.exists()
+    assert not first_mesh.exists()

@@ -26,7 +26,9 @@ _CENTER = """find => (...asked) => {
   if (!found) return null;
   found.scrollIntoView({block: "nearest"});
   const {x, y, width, height} = found.getBoundingClientRect();
-  return [x + width / 2, y + height / 2];
+  const middle = [x + width / 2, y + height / 2];
+  const hit = document.elementFromPoint(...middle);
+  return hit && (found.contains(hit) || hit.contains(found)) ? middle : null;
 }"""
 _VISIBLE = "[...document.querySelectorAll(kind)].filter(one => one.offsetParent)"
 _BY_TEXT = f"""text => {{
@@ -46,7 +48,10 @@ _BY_LABEL = f"""(text, number) => {{
   while (row && !fields().length) row = row.parentElement;
   return row && fields()[number];
 }}"""
-"""Where on the page something is, in JavaScript: the middle of what a text, an option or a label leads to."""
+"""Where on the page something is, in JavaScript: the middle of what a text, an option or a label leads to.
+
+Null while something else lies over it: a dialog that fades, for example.
+"""
 
 
 class Page:
@@ -73,7 +78,9 @@ class Page:
         """Evaluate until it is true."""
         give_up = time.monotonic() + limit_s
         while not (value := self.evaluate(expression)):
-            assert time.monotonic() < give_up, f"never true: {expression}"
+            if time.monotonic() > give_up:
+                text = self.evaluate("document.body.innerText")
+                raise AssertionError(f"never true: {expression}\n{text}")
             time.sleep(0.05)
         return value
 
@@ -85,9 +92,9 @@ class Page:
                 self.call("Input.dispatchMouseEvent", type=kind, clickCount=count, **at)
 
     def click(self, text: str, limit_s: float = 30.0, whole: bool = True) -> None:
-        """Click the element with exactly this text, once it exists, or with a text that begins like this."""
+        """Click the element with exactly this text, or with a text that begins like this, once it exists and stands."""
         find = _BY_TEXT if whole else _BY_BEGINNING
-        self.press(self.wait_for(f"({_CENTER})({find})({json.dumps(text)}, 0)", limit_s))
+        self.press(self._standing(f"({_CENTER})({find})({json.dumps(text)}, 0)", limit_s))
 
     def type(self, label: str, text: str, number: int = 0, field: str = "input", enter: bool = True) -> None:
         """Replace what is in one of the fields of a label, and press Enter unless told otherwise."""
@@ -102,18 +109,13 @@ class Page:
 
     def key(self, key: str) -> None:
         """Press and release a key, named as in `KeyboardEvent.key`."""
-        letter = len(key) == 1
-        named = {
-            " ": ("Space", 32),
-            "Backspace": ("Backspace", 8),
-            "Enter": ("Enter", 13),
-            "ArrowLeft": ("ArrowLeft", 37),
-            "ArrowRight": ("ArrowRight", 39),
-        }
-        code, number = named.get(key) or (f"Key{key.upper()}", ord(key.upper()))
-        about = {"key": key, "code": code, "windowsVirtualKeyCode": number}
-        self.call("Input.dispatchKeyEvent", type="keyDown", **about, **({"text": key} if letter else {}))
-        self.call("Input.dispatchKeyEvent", type="keyUp", **about)
+        self.keys(key)
+
+    def keys(self, *keys: str) -> None:
+        """Press and release keys one after the other, as fast as the browser takes them."""
+        for request in [request for key in keys for request in _strokes(key)]:
+            self._connection.send(json.dumps({"id": next(self._ids), **request}))
+        self.evaluate("0")  # the answers come in order
 
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         """Press the mouse at one place, move it in steps to another, and release it there."""
@@ -131,14 +133,15 @@ class Page:
     def choose(self, label: str, option: str) -> None:
         """Open the list of a label and take one of its options."""
         self.tick(label)
-        place, before = self._place_of(option), None
-        while place != before:  # the list moves while it opens, above its field or below
-            time.sleep(0.1)
-            place, before = self._place_of(option), place
-        self.press(place)
+        self.press(self._standing(f"({_CENTER})({_BY_OPTION})({json.dumps(option)}, 0)"))
 
-    def _place_of(self, option: str) -> tuple[float, float]:
-        return tuple(self.wait_for(f"({_CENTER})({_BY_OPTION})({json.dumps(option)}, 0)"))
+    def _standing(self, place: str, limit_s: float = 30.0) -> tuple[float, float]:
+        """The value of an expression for a place, once it moves no more: lists and dialogs move while they open."""
+        now, before = self.wait_for(place, limit_s), None
+        while now != before:
+            time.sleep(0.05)
+            now, before = self.wait_for(place, limit_s), now
+        return tuple(now)
 
     def drop(self, name: str, file: Path) -> None:
         """Drop a file on the page under a name."""
@@ -230,6 +233,26 @@ def another(page: Page) -> Iterator[Page]:
             yield Page(connection)
     finally:
         page.call("Target.closeTarget", targetId=target)
+
+
+def _strokes(key: str) -> list[dict[str, Any]]:
+    """The requests that press and release a key."""
+    letter = len(key) == 1
+    named = {
+        " ": ("Space", 32),
+        "Backspace": ("Backspace", 8),
+        "Enter": ("Enter", 13),
+        "Tab": ("Tab", 9),
+        "ArrowLeft": ("ArrowLeft", 37),
+        "ArrowRight": ("ArrowRight", 39),
+    }
+    code, number = named.get(key) or (f"Key{key.upper()}", ord(key.upper()))
+    about = {"key": key, "code": code, "windowsVirtualKeyCode": number}
+    method, typed = "Input.dispatchKeyEvent", {"text": key} if letter else {}
+    return [
+        {"method": method, "params": {"type": "keyDown", **about, **typed}},
+        {"method": method, "params": {"type": "keyUp", **about}},
+    ]
 
 
 def _page_address(profile: Path) -> str:

@@ -86,10 +86,9 @@ class Studio:
             assert time.monotonic() < give_up_s, "it never came to this"
         return message
 
-    def settle(self) -> None:
-        """Let the server's clock go on a little. A browser sends what is typed slightly later than clicks,
-        and only the newest field if two are changed at nearly the same time."""
-        end_s = self.server.ask({"op": "status"})["uptime_s"] + 0.3
+    def settle(self, seconds: float = 0.3) -> None:
+        """Let the server's clock go on a little, in which the browser sends what was typed."""
+        end_s = self.server.ask({"op": "status"})["uptime_s"] + seconds
         while self.server.ask({"op": "status"})["uptime_s"] < end_s:
             pass
 
@@ -170,12 +169,12 @@ def lying_still(server: LiveServer) -> Iterator[dict[str, np.ndarray]]:
 
 
 @contextlib.contextmanager
-def studio_in(folder: Path, model: Path) -> Iterator[Studio]:
+def studio_in(folder: Path, model: Path, rig_text: str = RIG) -> Iterator[Studio]:
     """A server that keeps its rig and takes in `folder`, and its page. Skips the test where there is no Chromium."""
     if (chromium := shutil.which("chromium")) is None:
         pytest.skip("needs chromium: apt-get install chromium")
     rig, takes = folder / "stage.toml", folder / "takes"
-    rig.write_text(RIG)
+    rig.write_text(rig_text)
     options = ("--rig", str(rig), "--model", str(model), "--takes", str(takes))
     with (
         serving(*options) as server,

@@ -419,3 +419,19 @@ def test_a_frame_that_comes_late_still_serves_the_past_of_the_window() -> None:
             assert timeline.push(late[0][0], {"body": screw(late.pop(0)[0])}, now) is None
     for a, b in zip(drain(timeline, 11.0), drain(punctual, 11.0), strict=True):
         assert same_pose(a.bodies["body"].window, b.bodies["body"].window)
+
+
+@given(st.lists(st.floats(0.002, 0.04), min_size=20, max_size=120), st.sampled_from([0.0, 0.1, 0.5]))
+def test_a_tick_falls_due_with_the_awaited_frame_and_with_none_before(gaps: list[float], look_ahead_s: float) -> None:
+    timeline = Timeline(look_ahead_s)
+    assert timeline.awaited() is None
+    t_s = 0.0
+    timeline.push(t_s, {"body": screw(t_s)}, t_s, "sender")
+    drain(timeline, t_s)
+    for gap in gaps:
+        t_s += gap
+        awaited = timeline.awaited()
+        assert awaited is not None
+        timeline.push(t_s, {"body": screw(t_s)}, t_s, "sender")
+        assert bool(drain(timeline, t_s)) == (t_s >= awaited[1])
+        assert awaited[0] == "sender"

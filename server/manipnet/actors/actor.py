@@ -112,6 +112,10 @@ class Actor:
         """When the next tick falls due if no frame arrives before; infinite before the first frame."""
         return self._timeline.next_poll_s(now_s)
 
+    def awaited(self) -> tuple[str, float] | None:
+        """The sender and the time of the frame that lets the next tick fall due, as `Timeline.awaited` has it."""
+        return self._timeline.awaited()
+
     def health(self, now_s: float) -> dict[str, BodyHealth]:
         """How every body arrives at present, by its role; a body that never arrived has an infinite age."""
         arriving = self._timeline.health(now_s)

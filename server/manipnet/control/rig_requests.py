@@ -5,8 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-import trimesh
-
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
 from manipnet.common.atomic_file import replacing
@@ -17,6 +15,7 @@ from manipnet.control.actors_proxy import ActorsProxy
 from manipnet.control.request import Handler, Request, RequestError
 from manipnet.geometry import Array
 from manipnet.runtime.object_catalog import ObjectCatalog
+from manipnet.synthesis.objects.ply import ply_file
 
 IDENTITY: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -71,8 +70,7 @@ class RigRequests:
         source = self._catalog.source(prop.object)
         if source is None or not source.path.is_file():  # it was dropped on the page, so it has no file here yet
             path = rig.resolve().parent / f"{prop.object}.ply"
-            mesh = trimesh.Trimesh(prop.shape.mesh.vertices, prop.shape.mesh.faces, process=False)
-            content: Any = mesh.export(file_type="ply")
+            content = ply_file(prop.shape.mesh.vertices, prop.shape.mesh.faces)
             if path.exists() and path.read_bytes() != content:
                 raise ConfigError(f"{path} already exists with another content; rename one of the two meshes")
             with replacing(path) as file:

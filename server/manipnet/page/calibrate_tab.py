@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import viser
 
-from manipnet.page.controls import Ask, Perform
+from manipnet.page.controls import Ask, Perform, at_once
 from manipnet.page.markdown import escape
 
 COUNTDOWN_S: Final = 3
@@ -43,6 +43,7 @@ class CalibrateTab:
             hint="under a prop: the prop stands on the centre of the sheet, with its x axis to the right; "
             "for any other place, run manipnet calibrate --at X Y Z --yaw DEGREES",
         )
+        self._actor.on_update(at_once(self._offer_places))
         for step, (text, label, icon) in STEPS.items():
             gui.add_markdown(f"{text}\n\n![{label}]({step}.png)", image_root=Path(__file__).parent)
             button = gui.add_button(label, icon=icon, hint=f"then keep your hands still for {COUNTDOWN_S} s")
@@ -56,8 +57,11 @@ class CalibrateTab:
             return
         self._props = props
         self._actor.options, self._actor.visible = tuple(props), len(props) > 1
-        names = dict.fromkeys(name for carried in props.values() for name in carried)
-        self._sheet.options = (*PLACES, *(f"under {name}" for name in names))
+        self._offer_places()
+
+    def _offer_places(self) -> None:
+        """Offer the props of the chosen actor, under which the sheet can lie."""
+        self._sheet.options = (*PLACES, *(f"under {name}" for name in self._props.get(self._actor.value, ())))
 
     def _calibrate(self, step: str, button: viser.GuiButtonHandle) -> None:
         request = {"op": "calibrate", "step": step, "actor": self._actor.value}

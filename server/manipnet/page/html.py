@@ -10,7 +10,7 @@ from manipnet.page.state import Verdict, ago
 DOTS: Final = {"good": "●", "notice": "○", "bad": "○"}
 MOST: Final = 3
 """Findings of the doctor that the stage shows; the panel *Health* has all of them."""
-ELSEWHERE: Final = "see the lines"
+ELSEWHERE: Final = "see the other findings"
 """A remedy that begins like this only points to another finding."""
 _LONGEST: Final = 240
 
@@ -39,7 +39,7 @@ def recording_mark(now: Mapping[str, Any] | None) -> str:
     if now is None:
         return ""
     elapsed = clock(now["seconds"])
-    return f'<div class="mn-recording"><b>● REC {elapsed}</b> {text(now["name"].removesuffix(".mcap"), 48)}</div>'
+    return f'<div class="mn-recording"><b>● REC {elapsed}</b><i>{text(now["name"].removesuffix(".mcap"), 48)}</i></div>'
 
 
 def clock(seconds: float) -> str:

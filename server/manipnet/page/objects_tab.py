@@ -10,7 +10,7 @@ import viser
 
 from manipnet.config.settings import SCALE_RANGE
 from manipnet.geometry import Array, quat_exp, quat_log
-from manipnet.page.controls import Ask, Perform, by_visitor
+from manipnet.page.controls import Ask, Fields, Perform, at_once, by_visitor
 from manipnet.page.frames import Frame
 from manipnet.page.gizmo import Gizmo
 from manipnet.page.markdown import escape
@@ -45,6 +45,7 @@ class ObjectsTab:
         self._turn = gui.add_vector3(
             "Rotation, °", (0.0, 0.0, 0.0), step=1.0, hint="about the x, y and z axes of the body"
         )
+        self._fields = Fields(self._object, self._scale, self._position, self._turn)
         self._drags = gui.add_checkbox(
             "Drag to move", False, hint="show arrows and rings in the scene that move the object on its body"
         )
@@ -71,7 +72,7 @@ class ObjectsTab:
         )
         self._problems = gui.add_markdown("")
         self._stand.on_click(lambda _: self._perform(self._stand_on_sheet))
-        self._body.on_update(by_visitor(self._show_body))
+        self._body.on_update(at_once(self._show_body))
         for handle in (self._object, self._scale):
             handle.on_update(by_visitor(lambda: self._perform(self._select)))
         for handle in (self._position, self._turn):
@@ -97,8 +98,8 @@ class ObjectsTab:
         if self._body.options != bodies:
             self._body.options = bodies
             self._show_body()
-        elif self._carried.get(self._body.value) != self._shown:  # a dropped file, the gizmo or a client changed it
-            self._show_body()
+        elif self._carried.get(self._body.value) != self._shown and self._fields.settled:
+            self._show_body()  # a dropped file, the gizmo or a client changed it
 
     def follow(self, frames: Sequence[Frame]) -> None:
         """Move the gizmo to the selected prop in the live frames of all actors; without any it is hidden."""
@@ -118,11 +119,11 @@ class ObjectsTab:
             return
         self._shown = prop
         if prop["object"] in self._object.options:
-            self._object.value = prop["object"]
-        self._scale.value = min(max(prop["scale"], self._scale.min), self._scale.max)
-        self._position.value = np.round(1e3 * np.array(prop.get("position", (0.0, 0.0, 0.0))), 2)
+            self._fields.write(self._object, prop["object"])
+        self._fields.write(self._scale, min(max(prop["scale"], self._scale.min), self._scale.max))
+        self._fields.write(self._position, np.round(1e3 * np.array(prop.get("position", (0.0, 0.0, 0.0))), 2))
         turn = np.degrees(quat_log(np.array(prop.get("rotation", (0.0, 0.0, 0.0, 1.0)))))
-        self._turn.value = np.round(turn, 2)
+        self._fields.write(self._turn, np.round(turn, 2))
 
     def _chosen(self) -> dict[str, Any]:
         prop = self._carried.get(self._body.value)

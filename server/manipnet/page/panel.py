@@ -150,9 +150,11 @@ class Panel:
         if (shown := self._view.recording) is not None:
             return html.take_line(shown.name, shown.seconds)
         detail = state.detail
-        if self._show.live and history.rate_hz(time.monotonic()):
+        if state.level != "bad" and self._show.live and history.rate_hz(time.monotonic()):
             latency = next(iter(self._show.live.values())).message.latency_ms
-            detail += f" · {latency.buffer:.0f} ms look-ahead + {latency.total - latency.buffer:.1f} ms processing"
+            processing = latency.total - latency.buffer
+            processing_text = f"{processing:.1f}" if processing < 10.0 else f"{processing:.0f}"
+            detail += f" · {latency.buffer:.0f} ms look-ahead + {processing_text} ms processing"
         return html.state_line(state, detail)
 
     def _controls(self, gui: viser.GuiApi) -> None:
@@ -192,7 +194,8 @@ def _health(status: dict[str, Any]) -> str:
     rows = ["| | body | Hz | last seen |", "|---|---|--:|--:|"]
     hands = []
     for name, actor in status["actors"].items():
-        if len(status["actors"]) > 1:
+        whose = f"{escape(name)}: " if len(status["actors"]) > 1 else ""
+        if whose:
             rows.append(f"| | **{escape(name)}** | | |")
         for body, health in actor["bodies"].items():
             carried = actor.get("objects", {}).get(body, body)
@@ -201,7 +204,7 @@ def _health(status: dict[str, Any]) -> str:
                 f"| {DOTS[health['state']]} | {label} | {health['rate_hz'] or 0.0:.0f} | {ago(health['age_s'])} |"
             )
         for side, hand in actor["hands"].items():
-            hands.append(f"{side} hand **{hand['state']}**{_on(hand['object'], actor)}")
+            hands.append(f"{whose}{side} hand **{hand['state']}**{_on(hand['object'], actor)}")
     return "\n".join(rows) + "\n\n" + "\n\n".join([*hands, refusals_text(status.get("drops", {}))])
 
 

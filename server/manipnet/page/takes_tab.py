@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import viser
 
-from manipnet.page.controls import Ask, Perform, by_visitor
+from manipnet.page.controls import Ask, Perform, at_once
 from manipnet.page.markdown import escape
 from manipnet.page.playback import read_recording
 from manipnet.page.transport import Transport
@@ -24,6 +24,11 @@ class TakesTab:
         self._folder, self._takes = Path(), dict[str, dict[str, Any]]()
         self._looked_s = float("-inf")
         self._shown: dict[str, Any] | None = None
+        """What the fields show, which a visitor may be changing."""
+        self._offered = 1
+        """The number of the next take that its field shows, unless a visitor has just changed it."""
+        self._asks = False
+        """Whether the question is open that a deletion asks first."""
         gui = client.gui
         gui.add_markdown("**Next take**")
         self._slate = gui.add_text("Slate", "", hint="with a slate, takes are called SLATE take NUMBER")
@@ -44,9 +49,9 @@ class TakesTab:
         show.on_click(lambda _: perform(self._show_take))
         download.on_click(lambda _: perform(self._download))
         delete.on_click(lambda _: self._confirm_delete())
-        self._take.on_update(by_visitor(self._show_facts))
+        self._take.on_update(at_once(self._show_facts))
         for handle in (self._slate, self._number):
-            handle.on_update(by_visitor(self._name_next))
+            handle.on_update(at_once(self._name_next))
         keep.on_click(lambda _: form.submit())
         form.on_submit(lambda _: perform(self._edit))
 
@@ -64,29 +69,30 @@ class TakesTab:
         names = tuple(self._takes) or (NONE,)
         if self._take.options != names:
             self._take.options = names
-        if self._takes.get(self._take.value) != self._shown:
-            self._show_facts()
+        self._show_facts()
 
     def _show_facts(self) -> None:
-        take = self._shown = self._takes.get(self._take.value)
+        """Show the chosen take. Its size changes while it is recorded, and what a visitor types meanwhile stays."""
+        take = self._takes.get(self._take.value)
         if take is None:
             self._facts.content = f"Takes are saved in {escape(self._folder)}"
-            return
-        recorded = time.strftime("%Y-%m-%d %H:%M", time.localtime(take["changed_s"]))
-        self._facts.content = f"{recorded} · {take['bytes'] / 1e6:.1f} MB in {escape(self._folder)}"
-        self._name.value = take["name"].removesuffix(".mcap")
-        self._own_slate.value, self._note.value = take.get("slate", ""), take.get("note", "")
-        self._own_number.value = take.get("number", 0)
+        else:
+            recorded = time.strftime("%Y-%m-%d %H:%M", time.localtime(take["changed_s"]))
+            self._facts.content = f"{recorded} · {take['bytes'] / 1e6:.1f} MB in {escape(self._folder)}"
+        if (about := _about(take or {"name": ""})) != self._shown:
+            self._name.value, self._own_slate.value = about["name"], about["slate"]
+            self._own_number.value, self._note.value = about["number"], about["note"]
+        self._shown = about
 
     def _name_next(self) -> None:
-        slate = self._slate.value.strip()
-        self._transport.about = {"slate": slate, "number": int(self._number.value)} if slate else {}
+        slate, self._offered = self._slate.value.strip(), int(self._number.value)
+        self._transport.about = {"slate": slate, "number": self._offered} if slate else {}
         self._show_next()
 
     def _show_next(self) -> None:
         about = self._transport.about
-        if about and self._number.value != about["number"]:
-            self._number.value = about["number"]
+        if about and about["number"] != self._offered:  # a recording has begun, and the next one has the next number
+            self._offered = self._number.value = about["number"]
         name = f"{about['slate']} take {about['number']}" if about else "take, with date and time"
         if self._preview.content != (text := f"Record makes: {escape(name)}"):
             self._preview.content = text
@@ -101,8 +107,7 @@ class TakesTab:
 
     def _edit(self) -> str | None:
         take = self._chosen()
-        before = {"name": take["name"].removesuffix(".mcap"), "slate": "", "number": 0, "note": ""}
-        before |= {key: take[key] for key in ("slate", "number", "note") if key in take}
+        before = _about(take)
         fields = {"name": self._name, "slate": self._own_slate, "number": self._own_number, "note": self._note}
         changes = {key: field.value for key, field in fields.items() if field.value != before[key]}
         if not changes:
@@ -113,15 +118,15 @@ class TakesTab:
         self._show_facts()
         return f"{answer['name']}: {' and '.join(changes)} kept"
 
-    def _download(self) -> str:
+    def _download(self) -> None:  # viser itself shows how far the download is
         take = self._chosen()
         self._client.send_file_download(take["name"], (self._folder / take["name"]).read_bytes(), save_immediately=True)
-        return f"{take['name']} goes to the browser's downloads"
 
     def _confirm_delete(self) -> None:
         take = self._takes.get(self._take.value)
-        if take is None:
+        if take is None or self._asks:
             return
+        self._asks = True
         gui = self._client.gui
         modal = gui.add_modal("Delete this take?")
         with modal:
@@ -130,7 +135,10 @@ class TakesTab:
             keep = gui.add_button("Keep it", color="gray")
 
         def end(confirmed: bool) -> None:
+            if modal.closed:  # by the first click of a double click
+                return
             modal.close()
+            self._asks = False
             if confirmed:
                 self._perform(lambda: self._delete(take["name"]))
 
@@ -142,3 +150,10 @@ class TakesTab:
         self._look()
         self._show_facts()
         return f"{name} is deleted"
+
+
+def _about(take: dict[str, Any]) -> dict[str, Any]:
+    """Name, slate, number and note of a take, as the fields show them."""
+    return {"name": take["name"].removesuffix(".mcap"), "slate": "", "number": 0, "note": ""} | {
+        key: take[key] for key in ("slate", "number", "note") if key in take
+    }

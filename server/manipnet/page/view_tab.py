@@ -4,7 +4,7 @@ from typing import Any, Final
 
 import viser
 
-from manipnet.page.controls import Ask, Perform, by_visitor, remembered
+from manipnet.page.controls import Ask, Fields, Perform, by_visitor, remembered
 from manipnet.page.framing import FollowCamera
 from manipnet.page.html import legend
 from manipnet.page.overlays import LAYERS, OVERLAYS
@@ -30,12 +30,13 @@ class ViewTab:
         self.look_ahead_s = 0.0
         """The look-ahead that is in force."""
         gui = client.gui
+        self._look_ahead: viser.GuiSliderHandle[int] | None = None
         if operator:
             slider = gui.add_slider("Look-ahead, ms", 0, 500, 10, initial_value=500)
             slider.on_update(
                 by_visitor(lambda: perform(lambda: _nothing(ask(op="look_ahead", seconds=1e-3 * slider.value))))
             )
-            self._look_ahead = slider
+            self._look_ahead, self._fields = slider, Fields(slider)
         self._follow = gui.add_button(
             "Follow the hands", icon=viser.Icon.FOCUS_2, hint="key C; the camera follows until you move it"
         )
@@ -55,9 +56,9 @@ class ViewTab:
         """Show whether the camera follows, and the look-ahead that is in force."""
         self.look_ahead_s = look_ahead_s
         self._follow.disabled = self._camera.following
-        slider = getattr(self, "_look_ahead", None)
-        if slider is not None and abs(slider.value - 1e3 * look_ahead_s) > 0.5:
-            slider.value = round(1e3 * look_ahead_s)
+        slider = self._look_ahead
+        if slider is not None and abs(slider.value - 1e3 * look_ahead_s) > 0.5 and self._fields.settled:
+            self._fields.write(slider, round(1e3 * look_ahead_s))
 
     def follow(self) -> None:
         """Give the camera back."""

@@ -24,8 +24,10 @@ from manipnet.page import policy
 
 OPERATOR: Final = ContextVar("OPERATOR", default=False)
 """Whether the visitor may change anything: a browser on this machine that shows a page of this machine."""
-SCRIPT: Final = files("manipnet.page").joinpath("page.js").read_text(encoding="utf-8")
-"""What the page adds to viser's client: a title, and the import of files that are dropped on it."""
+SCRIPT: Final = "".join(
+    files("manipnet.page").joinpath(name).read_text(encoding="utf-8") for name in ("page.js", "changes.js")
+)
+"""What the page adds to viser's client: its title, files that are dropped on it, keys, and changes kept in order."""
 STYLE: Final = files("manipnet.page").joinpath("page.css").read_text(encoding="utf-8")
 DROP_PATH: Final = "/drop"
 OPEN_S: Final = 10.0

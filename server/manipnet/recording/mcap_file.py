@@ -22,13 +22,13 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import trimesh
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import Writer
 from numpy.typing import NDArray
 
 from manipnet.geometry import Array
+from manipnet.synthesis.objects.ply import ply_file
 from manipnet.wire import HandsMessage, decode_msgpack, encode_msgpack
 from manipnet.wire.bodies import BodyFrame, BodySample, MessageError, bodies_map, parse_bodies
 from manipnet.wire.hand_names import OPENXR_JOINT_NAMES
@@ -177,9 +177,7 @@ class About:
 
 def mesh_file(vertices: Array, faces: NDArray[np.integer[Any]], scale: float = 1.0) -> bytes:
     """A mesh as a recording keeps it: a PLY file in metres, at the size it had on the stage."""
-    content = trimesh.Trimesh(scale * vertices, faces, process=False).export(file_type="ply")
-    assert isinstance(content, bytes)
-    return content
+    return ply_file(scale * vertices, faces)
 
 
 def bodies_of(message: HandsMessage) -> BodyFrame:

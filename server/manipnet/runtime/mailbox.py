@@ -1,8 +1,9 @@
 """Where receivers leave frames, and other threads their requests, for the thread that ticks."""
 
+import math
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Final, TypeVar
 
@@ -28,6 +29,7 @@ class Mailbox:
         self._news = threading.Condition()
         self._frames: deque[BodyFrame] = deque()
         self._requests: deque[tuple[Callable[[], object], Future]] = deque()
+        self._awaited: Mapping[str, float] = {}
 
     def put(self, frame: BodyFrame) -> None:
         """Leave a frame, without waiting for the tick thread."""
@@ -36,7 +38,8 @@ class Mailbox:
                 self._frames.popleft()
                 self._telemetry.count("frames_dropped", reason="mailbox_full")
             self._frames.append(frame)
-            self._news.notify()
+            if frame.t_s >= self._awaited.get(frame.source, -math.inf):
+                self._news.notify()
 
     def ask(self, question: Callable[[], T], timeout_s: float = 1.0) -> T:
         """Run `question` on the tick thread between two ticks; returns its answer or raises its error.
@@ -55,9 +58,14 @@ class Mailbox:
             answer.cancel()
             raise BusyError(f"the server did not answer within {timeout_s} s") from None
 
-    def wait(self, timeout_s: float) -> list[BodyFrame]:
-        """Take all frames, after a wait of at most `timeout_s` for something to arrive; answers the requests too."""
+    def wait(self, timeout_s: float, awaited: Mapping[str, float] | None = None) -> list[BodyFrame]:
+        """Take all frames, after a wait of at most `timeout_s` for something to arrive; answers the requests too.
+
+        A sender's frames from before the time `awaited` of it do not end the wait, because each end of it costs as much
+        as taking two frames in. Frames of other senders do.
+        """
         with self._news:
+            self._awaited = awaited or {}
             if not (self._frames or self._requests) and timeout_s > 0.0:
                 self._news.wait(timeout_s)
             frames, requests = list(self._frames), list(self._requests)

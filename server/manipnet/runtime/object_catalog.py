@@ -13,13 +13,15 @@ from manipnet.runtime.shape_process import make_shape
 from manipnet.synthesis.objects.foreign import SUFFIXES, foreign_format
 from manipnet.synthesis.objects.library import library_file, library_names
 from manipnet.synthesis.objects.mesh import FORMATS, MeshError
-from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.objects.shape import Shape, load_shape
 
 MAX_FOLDER_FILES: Final = 1000
 MAX_UNUSED: Final = 16
 """Shapes that are kept although nobody may carry them: those that were requested last."""
 MAX_UNUSED_TRIANGLES: Final = 600_000
 """Triangles of these shapes together, which take about 270 MB; the newest is kept whatever its size."""
+Build = Callable[[Path, str, float], Shape]
+"""Makes a shape of a file, a unit and a scale. Raises `MeshError`."""
 _log = logging.getLogger(__name__)
 
 
@@ -41,9 +43,7 @@ class ObjectCatalog:
     If two objects have the same name, the rig's comes before the folder's, and the folder's before the library's.
     """
 
-    def __init__(
-        self, folder: Path | None = None, unit: str = "m", build: Callable[[Path, str, float], Shape] = make_shape
-    ) -> None:
+    def __init__(self, folder: Path | None = None, unit: str = "m", build: Build = make_shape) -> None:
         """`unit` is the unit of the folder's files; `build` makes a shape of a file, a unit and a scale."""
         self._folder, self._unit, self._build_shape = folder, unit, build
         self._lock = threading.Lock()
@@ -57,9 +57,12 @@ class ObjectCatalog:
         self._problems: dict[Source, str] = {}
 
     def load(self, file: Path, unit: str = "m", scale: float = 1.0) -> Shape:
-        """The shape of a mesh file, which is an object from now on unless its name is taken. Raises `MeshError`."""
+        """The shape of a mesh file, which is an object from now on unless its name is taken. Raises `MeshError`.
+
+        No tick may run yet, because the file is read in this process, which is faster than to start another one.
+        """
         source = Source(file.resolve(), unit, scale)
-        shape = self._built(source)
+        shape = self._built(source, load_shape)
         with self._lock:
             self._sources.setdefault(shape.name, source)
             self._of_rig.add(source)
@@ -151,11 +154,11 @@ class ObjectCatalog:
             self._unsettled[source] = stamp
         return stamp == before
 
-    def _built(self, source: Source) -> Shape:
+    def _built(self, source: Source, build: Build | None = None) -> Shape:
         if (shape := self._known(source)) is not None:
             return shape
         with self._building:  # one shape at a time, and this one may have been built meanwhile
-            return self._known(source) or self._build(source)
+            return self._known(source) or self._build(source, build or self._build_shape)
 
     def _known(self, source: Source) -> Shape | None:
         with self._lock:
@@ -167,7 +170,7 @@ class ObjectCatalog:
     def _rebuilt(self, source: Source) -> Shape | None:
         try:
             with self._building:
-                shape = self._build(source)
+                shape = self._build(source, self._build_shape)
         except MeshError as error:
             _log.warning("a mesh file has changed, but its new content cannot be used: %s", error)
             with self._lock:
@@ -176,9 +179,9 @@ class ObjectCatalog:
         _log.warning("%s has changed and is loaded again", source.path)
         return shape
 
-    def _build(self, source: Source) -> Shape:
+    def _build(self, source: Source, build: Build) -> Shape:
         stamp = _stamp(source.path) or (0, 0)
-        shape = self._build_shape(source.path, source.unit, source.scale)
+        shape = build(source.path, source.unit, source.scale)
         _ = shape.rays  # a tick must not be the first to ask for them
         with self._lock:
             self._shapes[source], self._stamps[source] = shape, stamp

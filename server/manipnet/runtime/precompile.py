@@ -2,13 +2,20 @@
 
 The child also compiles what builds shapes and some smaller kernels, while the server imports its libraries and compiles
 inverse kinematics. The server then finds the child's work in the cache.
+
+`python -m manipnet.runtime.precompile` compiles everything for whoever starts this installation first, for a container
+perhaps; with `--into FOLDER` it does so for a wheel that is still to be built.
 """
 
+import argparse
+import sys
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Final
 
-from manipnet.jit import cached, collection_paused, seal_cache
+from manipnet.common.shipped_folder import FOLDER
+from manipnet.jit import cached, collection_paused, seal_cache, ship_kernels
 from manipnet.runtime.child_process import ChildProcess
 
 SENSING: Final = "_all_but_readings"
@@ -26,15 +33,14 @@ def compile_aside() -> None:
     from manipnet.synthesis.model.features import features
     from manipnet.synthesis.model.shipped import shipped_hand
     from manipnet.synthesis.objects.distance_field import build_field
-    from manipnet.synthesis.objects.library import load_library_mesh
-    from manipnet.synthesis.objects.shape import build_shape
+    from manipnet.synthesis.objects.shape import load_shape
     from manipnet.synthesis.synthesizer import HandScene, windows_of
     from manipnet.tracking.forecast import damped_velocity
     from manipnet.tracking.pose_buffer import PoseBuffer, sample
     from manipnet.tracking.smoothing import Smoothing
 
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
-    scene = HandScene("right", still, still, still, build_shape(load_library_mesh("cube")))
+    scene = HandScene("right", still, still, still, load_shape("cube"))
     build_field(scene.shape.bvh)
     hand = shipped_hand()
     features(hand, scene.shape, windows_of([scene]), *forward_kinematics(hand, np.zeros((1, hand.angle_count))))
@@ -74,3 +80,28 @@ def _compile(_: Connection) -> None:
     with suppress(Exception), collection_paused():  # the server meets the same error and reports it
         compile_aside()
         seal_cache()
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Compile the kernels, so that no first start has to. They fit this version of Python and this kind of computer."""
+    own = Path(__file__).parents[1] / FOLDER
+    parser = argparse.ArgumentParser(prog="python -m manipnet.runtime.precompile", description=main.__doc__)
+    parser.add_argument("--into", type=Path, default=own, metavar="FOLDER", help="default: this installation's kernels")
+    into: Path = parser.parse_args(arguments).into
+    from manipnet.runtime.warm_up import pose_a_hand
+    from manipnet.synthesis.model.bundle import load_bundle
+
+    with collection_paused():
+        compile_aside()
+        pose_a_hand(load_bundle())
+    try:
+        count = ship_kernels(into)
+    except (OSError, ValueError) as error:
+        print(f"the kernels cannot be written into {into}: {error}", file=sys.stderr)
+        return 1
+    print(f"wrote {count} files of compiled kernels into {into}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,31 +1,23 @@
-"""Large meshes are prepared in a child process.
+"""Meshes that were never read before are prepared in a child process.
 
-Reading and repairing one holds the GIL for tenths of a second, in which no tick could run. The child returns the mesh,
-and leaves its shape in the cache.
+Reading and repairing one holds the GIL for tenths of a second, in which no tick could run, and so does importing what
+does it. The child returns the mesh, and leaves it and its shape in the cache.
 """
 
 import io
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from manipnet.runtime.child_process import ChildProcess
 from manipnet.synthesis.objects.mesh import ClosedMesh, MeshError
-from manipnet.synthesis.objects.shape import Shape, build_shape, load_shape
-
-LARGE_BYTES: Final = 1_000_000
-"""Size of a mesh file with some 20,000 triangles. A smaller one is read faster than a process starts."""
+from manipnet.synthesis.objects.shape import Shape, build_shape, cached_mesh, load_shape
 
 
 def make_shape(path: Path, unit: str, scale: float) -> Shape:
     """The shape of a mesh file, as `load_shape` makes it, without a delay of the ticks. Raises `MeshError`."""
-    try:
-        is_large = path.stat().st_size >= LARGE_BYTES
-    except OSError:
-        is_large = False  # load_shape raises with the reason
-    return build_shape(_prepared(path, unit, scale)) if is_large else load_shape(path, unit, scale)
+    return build_shape(cached_mesh(path, unit, scale) or _prepared(path, unit, scale))
 
 
 def _prepared(path: Path, unit: str, scale: float) -> ClosedMesh:

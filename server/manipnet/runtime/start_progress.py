@@ -9,9 +9,11 @@ from typing import Final
 
 from platformdirs import user_cache_dir
 
+from manipnet.common.shipped_folder import brings_kernels
+
 STEP_S: Final = 1.0
 LOG_S: Final = 5.0
-TEXT: Final = "first start: code is compiled once, which takes some seconds"
+TEXT: Final = "first start: code is compiled once, which takes 10 to 30 seconds"
 
 
 class StartProgress:
@@ -53,8 +55,8 @@ class StartProgress:
 
 
 def is_first_start() -> bool:
-    """Whether no compiled code is kept on this machine yet. The compiler, which knows for certain, loads slowly."""
-    if os.environ.get("NUMBA_CACHE_DIR"):
+    """Whether no compiled code is on this machine yet. The compiler, which knows for certain, loads slowly."""
+    if os.environ.get("NUMBA_CACHE_DIR") or brings_kernels(Path(__file__).parents[1]):
         return False
     root = Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False)) / "kernels"
     return next(root.rglob("*.nbi"), None) is None

@@ -77,8 +77,8 @@ class TickLoop:
                     _log.exception("the state of this second cannot be reported")
 
     def take_in(self, wait_s: float) -> None:
-        """Give every actor what the receivers left, after a wait of at most `wait_s` for something."""
-        for frame in self._mailbox.wait(wait_s):
+        """Give every actor what the receivers left, after a wait of at most `wait_s` for what lets a tick fall due."""
+        for frame in self._mailbox.wait(wait_s, self._awaited()):
             try:
                 self._intake.push(frame)
             except Exception as error:
@@ -99,6 +99,17 @@ class TickLoop:
                 except Exception:
                     _log.exception("a tick cannot be shown on the page")
         return bool(plans)
+
+    def _awaited(self) -> dict[str, float]:
+        """By sender, the earliest time of a frame that lets a tick fall due; empty if any frame may."""
+        earliest_s: dict[str, float] = {}
+        for actor in self._actors:
+            awaited = actor.awaited()
+            if awaited is None:
+                return {}
+            source, t_s = awaited
+            earliest_s[source] = min(earliest_s.get(source, t_s), t_s)
+        return earliest_s
 
     def _plan(self, actor: Actor, tick: Tick) -> Plan:
         try:

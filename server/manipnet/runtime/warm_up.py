@@ -21,8 +21,7 @@ from manipnet.synthesis.hand.model_profile import model_profile
 from manipnet.synthesis.ik.pose import allocate_poses, pose_kernel
 from manipnet.synthesis.ik.solvers import DEFAULT_SOLVER
 from manipnet.synthesis.model.bundle import Bundle
-from manipnet.synthesis.objects.library import load_library_mesh
-from manipnet.synthesis.objects.shape import Shape, build_shape
+from manipnet.synthesis.objects.shape import Shape, load_shape
 from manipnet.synthesis.synthesizer import HandScene, Synthesizer, windows_of
 from manipnet.telemetry import Telemetry
 from manipnet.wire import encode_binary, encode_msgpack
@@ -61,7 +60,7 @@ def warm_up(bundle: Bundle, shapes: Sequence[Shape], solver: str = DEFAULT_SOLVE
 
 def pose_a_hand(bundle: Bundle, solver: str = DEFAULT_SOLVER) -> None:
     """Decode and solve one pose: at a first start this process compiles the solver, while another compiles the rest."""
-    shape, still = build_shape(load_library_mesh("cube")), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
+    shape, still = load_shape("cube"), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     windows = windows_of([HandScene("right", still, still, still, shape)])
     hand, layout, before = bundle.hand, bundle.layout, bundle.rest_angles[None]
     outputs = bundle.infer(np.zeros((1, layout.input_size), np.float32))

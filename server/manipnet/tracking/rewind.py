@@ -18,6 +18,11 @@ class Rewind:
         self._resumed: tuple[int, float] | None = None
         """The tick at which the sender resumed, and our clock when it did."""
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether there is nothing to rewind to."""
+        return self._resumed is None
+
     def forget(self) -> None:
         """Do not rewind, because a new run begins."""
         self._resumed = None

@@ -26,6 +26,10 @@ class SenderHandover:
             if self.may_send(name, source, now_s):
                 self._owners[name] = (source, now_s)
 
+    def clock_owner(self) -> str | None:
+        """The sender whose clock is the stream's; None before the first frame."""
+        return self._owners[CLOCK][0] if CLOCK in self._owners else None
+
     def forget(self, name: str) -> None:
         """Forget which sender moves a body."""
         self._owners.pop(name, None)

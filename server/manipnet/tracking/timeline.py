@@ -127,6 +127,16 @@ class Timeline:
             return np.inf
         return max(self._schedule.next_poll_s(self._ending or self._run, self._ending is not None), now_s)
 
+    def awaited(self) -> tuple[str, float] | None:
+        """The sender whose clock is the stream's, and the time of the frame that lets the next tick fall due.
+
+        None if any frame may change when the next tick falls due.
+        """
+        source = self._senders.clock_owner()
+        if self._run is None or source is None or self._ending is not None or not self._rewind.is_idle:
+            return None
+        return source, self._schedule.due_s(self._run, self._run.next_index) - TIME_TOLERANCE_S
+
     def health(self, now_s: float) -> dict[str, BodyHealth]:
         """How every body of this run arrives."""
         return {} if self._run is None else self._run.health(now_s)

@@ -1,17 +1,24 @@
 """Shapes: distances, rays, mass and cache, against analytic bodies, brute force and independent values."""
 
+import io
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import trimesh
 from compiled import call
+from trimesh.triangles import mass_properties
 
 from manipnet.demo.player import DEMO_OBJECTS
 from manipnet.synthesis.objects.bvh import least_along
 from manipnet.synthesis.objects.distance_field import field_distance
-from manipnet.synthesis.objects.library import load_library_mesh
+from manipnet.synthesis.objects.library import LIBRARY_FOLDER, library_names, load_library_mesh
+from manipnet.synthesis.objects.mass import mass_of
 from manipnet.synthesis.objects.mesh import closed_mesh
+from manipnet.synthesis.objects.ply import ply_file
 from manipnet.synthesis.objects.rays import TreeRays
-from manipnet.synthesis.objects.shape import PREBUILT_FOLDER, build_shape, cache_name, load_shape
+from manipnet.synthesis.objects.shape import PREBUILT_FOLDER, build_shape, cache_name, cached_mesh, load_shape
 
 RADIUS = 0.04
 HALF = np.array([0.03, 0.04, 0.05])
@@ -135,6 +142,68 @@ def test_independent_values(manipnet_data, take):
     np.testing.assert_allclose(shape.trace(*rays), checks[f"{take}/ray_distance"].reshape(-1), atol=1e-5)
     np.testing.assert_allclose(shape.center_of_mass, checks[f"{take}/center_of_mass"], atol=1e-6)
     np.testing.assert_allclose(shape.volume_m3, checks[f"{take}/volume"], rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_mass_properties_are_those_that_trimesh_finds(name):
+    mesh = load_library_mesh(name)
+    place = np.array([3.0, -2.0, 5.0])
+    mass = mass_of(mesh.vertices + place, mesh.faces)
+    expected = mass_properties(mesh.vertices[mesh.faces])
+    np.testing.assert_allclose(mass.center_of_mass - place, expected["center_mass"], atol=1e-12)
+    np.testing.assert_allclose(mass.volume_m3, expected["volume"], rtol=1e-9)
+    inertia = expected["inertia"] / expected["mass"]
+    np.testing.assert_allclose(mass.inertia, inertia, atol=1e-9 * np.abs(inertia).max())
+
+
+def test_a_file_that_was_read_before_needs_no_reader(tmp_path):
+    path = tmp_path / "crate.ply"
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(path)
+    program = f"""
+import os, sys
+from manipnet.synthesis.objects.shape import load_shape  # the cache of compiled code stays the usual one
+os.environ["MANIPNET_CACHE"] = {str(tmp_path / "cache")!r}
+print(load_shape({str(path)!r}, "m", 2.0).volume_m3, load_shape("mug").volume_m3, "trimesh" in sys.modules)
+"""
+    answers = [subprocess.run([sys.executable, "-c", program], text=True, capture_output=True) for _ in range(2)]
+    assert not any(answer.stderr for answer in answers), answers
+    (volume, mug, read), (again, mug_again, read_again) = (answer.stdout.split() for answer in answers)
+    assert float(volume) == pytest.approx(0.048)
+    assert (again, mug_again) == (volume, mug)
+    assert (read, read_again) == ("True", "False")
+
+
+def test_a_cached_mesh_belongs_to_the_content_the_unit_and_the_scale(tmp_path, monkeypatch):
+    monkeypatch.setenv("MANIPNET_CACHE", str(tmp_path / "cache"))
+    path = tmp_path / "crate.ply"
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(path)
+    assert load_shape(path).volume_m3 == pytest.approx(1e-3)
+    assert load_shape(path, scale=2.0).volume_m3 == pytest.approx(8e-3)
+    assert load_shape(path, "cm", 50.0).volume_m3 == pytest.approx(1.25e-4)
+    assert load_shape(path, name="box").name == "box"
+    trimesh.creation.box((0.2, 0.1, 0.1)).export(path)
+    assert load_shape(path).volume_m3 == pytest.approx(2e-3)
+    assert cached_mesh(path) is not None
+    for file in (tmp_path / "cache").glob("mesh-*"):
+        file.write_bytes(b"not an archive")
+    assert load_shape(path).volume_m3 == pytest.approx(2e-3)
+    assert cached_mesh(tmp_path / "none.ply") is None
+
+
+@pytest.mark.parametrize("name", library_names())
+def test_meshes_of_the_library_are_closed_in_advance(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("MANIPNET_CACHE", str(tmp_path))
+    path = LIBRARY_FOLDER / f"{name}.ply"
+    mesh = cached_mesh(path)
+    assert mesh is not None, "run python -m manipnet_tools.assets.prebuilt_shapes"
+    assert mesh.content_hash == load_library_mesh(name).content_hash
+
+
+def test_a_ply_file_reads_as_it_was_written():
+    mesh = load_library_mesh("mug")
+    read = trimesh.load_mesh(io.BytesIO(ply_file(mesh.vertices, mesh.faces)), file_type="ply", process=False)
+    np.testing.assert_array_equal(read.vertices, mesh.vertices)
+    np.testing.assert_array_equal(read.faces, mesh.faces)
 
 
 def test_the_shapes_of_the_demo_are_prebuilt(tmp_path):

@@ -43,8 +43,11 @@ def _of_part(part: str, health: Mapping[str, Any], report: Report) -> Finding:
     )
     if health["state"] == "live":
         return Finding("ok" if share > 0.9 else "note", text)
-    remedy = "see the lines about what is dropped or rejected"
-    return Finding("problem", f"{text}, but is not used{_why(report)}", remedy)
+    why = _why(report)
+    remedy = (
+        "see the other findings about what is dropped" if why else "this computer may be too busy: run manipnet bench"
+    )
+    return Finding("problem", f"{text}, but is not used{why}", remedy)
 
 
 def _missing(part: str, key: object, arrived: Mapping[str, Mapping[str, Any]], report: Report) -> Finding:
@@ -58,7 +61,7 @@ def _missing(part: str, key: object, arrived: Mapping[str, Mapping[str, Any]], r
     others = sorted({label(body) for _, body in _fresh(report)})
     remedy = "give the body that name in the tracking software, or name one of these in the rig: " + listed(others)
     if not others:
-        remedy = "see the lines about what arrives; no body does"
+        remedy = "see the other findings: no body arrives at all"
     return Finding("problem", f"{part}: no body {key!r} arrives", remedy)
 
 

@@ -1,4 +1,7 @@
-"""Meshes of objects: read in metres, closed and turned outward, or refused with the reason and the remedy."""
+"""Meshes of objects: read in metres, closed and turned outward, or refused with the reason and the remedy.
+
+What reads and repairs them is imported only when it is needed: `mesh_cache` has the meshes that were read before.
+"""
 
 import hashlib
 from dataclasses import dataclass
@@ -6,22 +9,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 
 from manipnet.synthesis.objects.foreign import foreign_format
 from manipnet.synthesis.objects.glb import read_glb
 from manipnet.synthesis.objects.glb_accessors import GlbError
-from manipnet.synthesis.objects.repair import (
-    agree,
-    drop_debris,
-    fill_small_holes,
-    is_closed,
-    mesh_edges,
-    orient,
-    signed_volume,
-    weld,
-)
 from manipnet.synthesis.objects.units import UNITS_M, plausible_units
 
 FORMATS: Final = (".obj", ".ply", ".stl", ".glb")
@@ -71,6 +63,8 @@ def closed_mesh(vertices: NDArray, faces: NDArray, name: str) -> ClosedMesh:
     holes are closed, and each shell is turned outward, or inward if it is the wall of a cavity. A mesh that needs none
     of this keeps its arrays.
     """
+    from manipnet.synthesis.objects.repair import agree, drop_debris, fill_small_holes, is_closed, orient, weld
+
     vertices, faces = np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int32)
     _check_arrays(vertices, faces)
     _check_size(vertices[np.unique(faces)])
@@ -110,6 +104,8 @@ def _arrays(path: Path) -> tuple[NDArray, NDArray]:
     """Vertices and triangles as they are in the file."""
     if path.suffix.lower() == ".glb":
         return read_glb(path.read_bytes())
+    import trimesh
+
     options = {"skip_materials": True} if path.suffix.lower() == ".obj" else {}
     mesh = trimesh.load_mesh(path, process=False, **options)
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
@@ -144,6 +140,8 @@ def _check_size(vertices: NDArray) -> None:
 
 
 def _check_closed(vertices: NDArray, faces: NDArray) -> None:
+    from manipnet.synthesis.objects.repair import mesh_edges, signed_volume
+
     if not len(faces):
         raise MeshError("has no triangle with an area; export the surface again")
     edges = mesh_edges(faces)

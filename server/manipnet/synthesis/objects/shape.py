@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from platformdirs import user_cache_dir
-from trimesh.triangles import mass_properties
 
 from manipnet.geometry import Array
 from manipnet.jit import kernel
@@ -21,14 +20,17 @@ from manipnet.synthesis.objects.distance_field import (
     signed_distance,
 )
 from manipnet.synthesis.objects.library import library_file
+from manipnet.synthesis.objects.mass import mass_of
 from manipnet.synthesis.objects.mesh import ClosedMesh, load_mesh
+from manipnet.synthesis.objects.mesh_cache import mesh_cache_name, read_cached_mesh, write_cached_mesh
 from manipnet.synthesis.objects.rays import RayScene, ray_scene
 from manipnet.synthesis.objects.shape_cache import read_cached, write_cached
 from manipnet.synthesis.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES, simplified
 
 _CACHE_VERSION = f"1-{RESOLUTION}"
 PREBUILT_FOLDER = Path(__file__).with_name("prebuilt")
-"""The shapes of the demo's objects, so that a first start need not compile the code that builds them."""
+"""The shapes of the demo's objects, so that a first start need not compile the code that builds them, and the closed
+meshes of the library."""
 
 
 class Solid(NamedTuple):
@@ -129,22 +131,38 @@ def load_shape(mesh: Path | str, unit: str = "m", scale: float = 1.0, name: str 
     """
     if not Path(mesh).is_file() and (file := library_file(str(mesh))) is not None:
         mesh, unit = file, "m"
-    return build_shape(load_mesh(mesh, unit, scale, name))
+    path = Path(mesh)
+    known = cached_mesh(path, unit, scale, name)
+    if known is None:
+        known = load_mesh(path, unit, scale, name)
+        if (file_name := mesh_cache_name(path, unit, scale)) is not None:
+            write_cached_mesh(_cache_folder() / file_name, known)
+    return build_shape(known)
+
+
+def cached_mesh(path: Path, unit: str = "m", scale: float = 1.0, name: str | None = None) -> ClosedMesh | None:
+    """The closed mesh of a file that was read before with the same content, unit and scale, from the cache."""
+    file_name = mesh_cache_name(path, unit, scale)
+    if file_name is None:
+        return None
+    found = (read_cached_mesh(folder / file_name, name or path.stem) for folder in (_cache_folder(), PREBUILT_FOLDER))
+    return next((mesh for mesh in found if mesh is not None), None)
 
 
 def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
     """Build a shape, or read it from the cache folder: `cache_dir`, else `MANIPNET_CACHE`, else the user's."""
-    folder = cache_dir or Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
-    path = folder / cache_name(mesh)
+    path = (cache_dir or _cache_folder()) / cache_name(mesh)
     parts = read_cached(path) or read_cached(PREBUILT_FOLDER / path.name)
     if parts is None:
         sensed = simplified(mesh)
         bvh = build_bvh(sensed.vertices, sensed.faces)
         parts = bvh, build_field(bvh)
         write_cached(path, *parts)
-    mass = mass_properties(mesh.vertices[mesh.faces])
-    inertia = np.asarray(mass["inertia"]) / mass["mass"]
-    return Shape(mesh, *parts, np.asarray(mass["center_mass"]), float(mass["volume"]), inertia)
+    return Shape(mesh, *parts, *mass_of(mesh.vertices, mesh.faces))
+
+
+def _cache_folder() -> Path:
+    return Path(os.environ.get("MANIPNET_CACHE") or user_cache_dir("manipnet", appauthor=False))
 
 
 def cache_name(mesh: ClosedMesh) -> str:

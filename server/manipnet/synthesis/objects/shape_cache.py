@@ -1,12 +1,13 @@
-"""Files with the parts of a shape that take long to build: its volume hierarchy and its distance field."""
+"""Files with what takes long to make: closed meshes, and the volume hierarchies and distance fields of shapes."""
 
 import logging
 import os
 import zipfile
 import zlib
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,29 +21,42 @@ _log = logging.getLogger(__name__)
 
 
 def read_cached(path: Path) -> tuple[Bvh, Field] | None:
-    """The parts in a file; None if there is no file or it cannot be read."""
-    try:
-        with suppress(OSError):
-            os.utime(path)  # the files that were used last are kept longest
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
-            bvh = Bvh(*(data[name] for name in Bvh._fields))
-            return bvh, Field(data["origin"], float(data["cell_m"]), data["distance"], data["triangle"])
-    except FileNotFoundError:
+    """The parts of a shape in a file; None if there is no file or it cannot be read."""
+    arrays = read_arrays(path, (*Bvh._fields, *Field._fields))
+    if arrays is None:
         return None
-    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
-        _log.warning("the cached shape %s is damaged (%s), so the shape is built again", path, error)
-        return None
+    origin, cell_m, distance, triangle = arrays[len(Bvh._fields) :]
+    return Bvh(*arrays[: len(Bvh._fields)]), Field(origin, float(cell_m), distance, triangle)
 
 
 def write_cached(path: Path, bvh: Bvh, field: Field) -> None:
     """Write the parts of a shape, or log why that is not possible."""
+    write_arrays(path, **bvh._asdict(), **field._asdict())
+
+
+def read_arrays(path: Path, names: Sequence[str]) -> list[np.ndarray] | None:
+    """Arrays of a file in the cache, by their names; None if there is no file or it cannot be read."""
+    try:
+        with suppress(OSError):
+            os.utime(path)  # the files that were used last are kept longest
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
+            return [data[name] for name in names]
+    except FileNotFoundError:
+        return None
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+        _log.warning("the cached file %s is damaged (%s), so its content is made again", path, error)
+        return None
+
+
+def write_arrays(path: Path, **arrays: Any) -> None:
+    """Write a file of the cache, or log why that is not possible."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as file:
-            np.savez(file, **bvh._asdict(), **field._asdict())
+            np.savez(file, **arrays)
         _remove_oldest(path.parent)
     except OSError as error:
-        _log.warning("the shape %s cannot be cached (%s), so the next start builds it again", path, error)
+        _log.warning("%s cannot be written (%s), so the next start makes its content again", path, error)
 
 
 def _remove_oldest(folder: Path) -> None:
