@@ -51,6 +51,7 @@ def add_full_width(programs: Path, wheel: str) -> None:
     subprocess.run([programs / "python", "-m", "pip", "install", "-q", wheel], check=True)
     version = subprocess.run([programs / "manipnet", "--version"], stdout=subprocess.PIPE, text=True, check=True).stdout
     assert "manipnet-full-int8" in version, version
+    assert "manipnet-open: Apache-2.0" in version, version
 
 
 def start_demo(command: list[str], folder: str) -> None:

@@ -35,10 +35,12 @@ def arrays_of(hand: Hand) -> dict[str, np.ndarray]:
     return {f"{name}.{field}": value for name, values in tuples.items() for field, value in values._asdict().items()}
 
 
-def test_every_shipped_bundle_has_the_same_hand() -> None:
-    assert len(shipped_bundles()) == 4
-    contents = {(folder / HAND_FILE).read_bytes() for folder in shipped_bundles().values()}
-    assert len(contents) == 1
+def test_every_shipped_bundle_has_the_hand_of_its_data() -> None:
+    hands = {name: (folder / HAND_FILE).read_bytes() for name, folder in shipped_bundles().items()}
+    assert len(hands) == 5
+    free = hands.pop("manipnet-open")
+    assert len(set(hands.values())) == 1
+    assert free not in hands.values()
 
 
 def test_the_layout_of_the_shipped_hand_is_that_of_the_paper() -> None:

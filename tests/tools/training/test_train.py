@@ -14,7 +14,7 @@ from manipnet.common.options import ConfigError
 from manipnet.geometry import quat_exp
 from manipnet.synthesis.hand.kinematics import forward_kinematics
 from manipnet.synthesis.model.bundle import load_bundle
-from manipnet.synthesis.model.layout import layout_of
+from manipnet.synthesis.model.layout import PRESENT, layout_of
 from manipnet.synthesis.model.shipped import BundleError, shipped_hand
 from manipnet.synthesis.objects.mesh import closed_mesh
 from manipnet.synthesis.objects.shape import build_shape
@@ -24,6 +24,7 @@ from manipnet_tools.generate.free_hand import free_hand
 from manipnet_tools.generate.proportions import Proportions, proportioned
 from manipnet_tools.takes.dataset import DataError
 from manipnet_tools.training import quantise
+from manipnet_tools.training.augment import SLIDE_M_S, drawn_slides, with_slides
 from manipnet_tools.training.config import TrainConfig
 from manipnet_tools.training.dataset import CapturedHand, TakeSet
 from manipnet_tools.training.model import hidden_columns
@@ -96,6 +97,21 @@ def test_a_model_learns(hands):
     config = replace(TINY, rounds=1, epochs_per_round=8, learning_rate=3e-3, huber=0.0)
     trainer = Trainer(new_model(HAND, samples, config), config)
     assert trainer.learn(samples) < 0.5, "a constant answer has a mean squared deviation of one"
+
+
+def test_objects_that_slide_in_the_hand_are_now_where_they_were(hands):
+    captured = hands[0].hands[0]
+    frames, rng = np.array([100, 200, 300]), np.random.default_rng(0)
+    windows = captured.windows(frames)
+    assert with_slides(windows, drawn_slides(3, 0.0, rng)) is windows
+    slid = with_slides(windows, drawn_slides(3, 1.0, rng))
+    assert np.allclose(slid.object[:, PRESENT], windows.object[:, PRESENT])
+    away = np.linalg.norm(slid.object[..., :3] - windows.object[..., :3], axis=2)
+    assert (away[:, [0, -1]] > 0.005).all()
+    assert away.max() < 0.5 * 5.0 * SLIDE_M_S * np.sqrt(3.0)
+    assert np.allclose(slid.wrist, windows.wrist)
+    some = drawn_slides(1000, 0.3, rng).any(axis=(1, 2))
+    assert 0.25 < some.mean() < 0.35
 
 
 def test_the_same_seed_gives_the_same_model(hands, learned):

@@ -93,10 +93,13 @@ def _strongest(weights: Array, count: int) -> tuple[NDArray[np.int64], Array]:
 
 
 def main() -> None:
-    """Rewrite the hand of every shipped bundle."""
+    """Rewrite the hand of the shipped bundles that have the dataset subject's; the free hand has a skin of its own."""
+    subject = shipped_hand()
     for model, folder in shipped_bundles().items():
+        if shipped_hand(model).name != subject.name:
+            continue
         path = folder / HAND_FILE
-        hand = with_surface(shipped_hand(model))
+        hand = with_surface(subject)
         write_hand(hand, path)
         print(f"{path}: {len(hand.skin.vertices)} vertices, {hand.sensor_count} sensors, {path.stat().st_size} bytes")
 

@@ -14,7 +14,7 @@ from manipnet.synthesis.objects.shape import Shape
 from manipnet_tools.generate.approaches import approach
 from manipnet_tools.generate.contact import Space, mirrored_space, space_around
 from manipnet_tools.generate.finger_tables import Tables
-from manipnet_tools.generate.grasps import Grasp, find_grasp
+from manipnet_tools.generate.grasps import Grasp, find_grasp, shifted_grasp
 from manipnet_tools.generate.mirrored import Mirrored, Surface, mirrored_corners, mirrored_sites
 from manipnet_tools.generate.proposals import Pinches, kinds_for, propose
 from manipnet_tools.generate.shapes import MadeShape
@@ -25,6 +25,8 @@ from manipnet_tools.generate.two_hands import DOWNS, TwoHands
 WANTED: Final = 12
 """Grasps for each hand."""
 MOST_TRIES: Final = 240
+SHIFTS: Final = 4
+"""A hand that holds is never quite still: so many poses near each grasp are tried."""
 _ALIKE: Final = 0.34
 """No kind makes up more than this share of a hand's grasps while others are still found."""
 
@@ -45,6 +47,8 @@ class Held:
     """`(J, 3)`"""
     touching: int
     """How many capsules touch."""
+    shifts: tuple[tuple[Array, Array], ...]
+    """Poses of the wrist nearby, with the angles at which the same fingers still touch."""
     pair: int = -1
     """Two hands that hold only together have the same number, others -1."""
 
@@ -84,10 +88,10 @@ def fill_bank(tables: Tables, pinches: tuple[Pinches, Pinches], made: MadeShape,
         held: list[Held] = []
         for number, pair in enumerate(both.pairs(right, left, WANTED // 2, bank.refused)):
             bank.verified["press"] += 2
-            held += [_held(tables, seen, grasp, number) for seen, grasp in zip(sides, pair, strict=True)]
+            held += [_held(tables, seen, grasp, number, rng) for seen, grasp in zip(sides, pair, strict=True)]
         return replace(bank, grasps=tuple(held))
     alone = [
-        _held(tables, seen, grasp, -1)
+        _held(tables, seen, grasp, -1, rng)
         for seen in sides
         for grasp in _candidates(
             tables, pinches, seen, kinds, bank, rng, WANTED, Shaker(tables, seen.surface, seen.pieces)
@@ -147,15 +151,19 @@ def _candidates(
     return found
 
 
-def _held(tables: Tables, seen: _Side, grasp: Grasp, pair: int) -> Held:
+def _held(tables: Tables, seen: _Side, grasp: Grasp, pair: int, rng: Generator) -> Held:
     """The grasp in the object's own frame, with the way to it."""
     opened, back = approach(tables, seen.space, grasp)
-    pose, downs = pose_of(grasp), grasp.downs if pair < 0 else DOWNS
-    joints = transform(pose, forward_kinematics(tables.hand, grasp.angles)[0])
+    shifts = [shifted for _ in range(SHIFTS) if (shifted := shifted_grasp(tables, seen.space, grasp, rng)) is not None]
+    poses = np.array([pose_of(each) for each in (grasp, *shifts)])
+    downs = grasp.downs if pair < 0 else DOWNS
+    joints = transform(poses[0], forward_kinematics(tables.hand, grasp.angles)[0])
     if seen.side == "left":
-        pose, joints, back = mirror_poses(pose), mirror_points(joints), mirror_points(back)
+        poses, joints, back = mirror_poses(poses), mirror_points(joints), mirror_points(back)
         downs = downs if pair >= 0 else mirror_points(downs)
-    return Held(seen.side, grasp.kind, pose, grasp.angles, opened, back, downs, joints, int(grasp.touching.sum()), pair)
+    near = tuple((pose, shifted.angles) for pose, shifted in zip(poses[1:], shifts, strict=True))
+    touching = int(grasp.touching.sum())
+    return Held(seen.side, grasp.kind, poses[0], grasp.angles, opened, back, downs, joints, touching, near, pair)
 
 
 def apart(first: Held, second: Held, least_m: float) -> bool:

@@ -7,17 +7,18 @@ whichever way gravity points is refused (`forces`).
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from manipnet.geometry import Array
 from manipnet_tools.generate.contact import Space, distance_of, look, score_rows, settle
 from manipnet_tools.generate.finger_tables import RELAXED, FingerTable, Tables
 from manipnet_tools.generate.forces import carried, cone_columns
-from manipnet_tools.generate.proposals import Proposal
+from manipnet_tools.generate.proposals import ONE_SIDED, Proposal
 
 ROWS: Final = 36
 """Rows of each finger's table that are considered."""
@@ -26,7 +27,13 @@ TOUCH_M: Final = 0.0025
 DEEPEST_M: Final = 0.0038
 OVERLAP_M: Final = 0.0045
 FOREARM_M: Final = 0.028
-NEIGHBOURS: Final = 0.18
+SHIFT_M, SHIFT_RAD = 0.004, 0.06
+"""How far a wrist moves about a grasp, along and about each axis, one standard deviation."""
+NEIGHBOURS: Final = 0.05
+"""What it costs that neighbouring fingers bend differently."""
+OPPOSED: Final = 3.0
+"""What it is worth that the thumb presses against what the fingers press on: more than how well it touches, because
+people hold between a thumb and the fingers that oppose it (Napier 1956)."""
 _ROUNDS: Final = 6
 
 
@@ -52,6 +59,7 @@ def find_grasp(tables: Tables, space: Space, proposal: Proposal, centre: Array, 
     if not _arm_free(space, turn, place):
         refused["arm or palm inside"] += 1
         return None
+    proposal = replace(proposal, wanted=_taking_part(tables, space, turn, place, proposal))
     angles = _fingers(tables, space, turn, place, proposal.wanted)
     if angles is None:
         refused["fingers do not touch"] += 1
@@ -70,6 +78,15 @@ def _arm_free(space: Space, turn: Array, place: Array) -> bool:
     return all(
         distance_of(space, place - 0.02 * k * turn[:, 0]) > (0.018 if k == 0 else FOREARM_M) for k in range(0, 9, 2)
     )
+
+
+def _taking_part(tables: Tables, space: Space, turn: Array, place: Array, proposal: Proposal) -> Array:
+    """What contacts are worth, `(5, 3)`, with zeros for the fingers whose knuckles are too far from the object."""
+    ring, little = look(space, tables.body, RELAXED, turn, place)[0][2:4]
+    wanted = proposal.wanted.copy()
+    if little > proposal.nearest_m:
+        wanted[3 if ring > proposal.nearest_m else 4 :] = 0.0
+    return wanted
 
 
 def _scored(
@@ -120,9 +137,10 @@ def _fingers(tables: Tables, space: Space, turn: Array, place: Array, wanted: Ar
 def _thumbs(tables: Tables, space: Space, turn: Array, place: Array, angles: Array, proposal: Proposal) -> list[Array]:
     """Angles with the best thumbs: they touch, oppose the fingers, and do not run into them."""
     table, wanted = tables.fingers[0], proposal.wanted[0]
+    worth = 0.0 if proposal.kind in ONE_SIDED else OPPOSED
     _, scores = _scored(space, turn, place, table, tables.hand.radii, wanted)
     value = scores - table.costs
-    rows = np.argpartition(-value, 3 * ROWS)[: 3 * ROWS]
+    rows = np.argpartition(-value, 4 * ROWS)[: 4 * ROWS]
     kept: list[tuple[float, Array]] = []
     for row in rows:
         posed = angles.copy()
@@ -130,7 +148,8 @@ def _thumbs(tables: Tables, space: Space, turn: Array, place: Array, angles: Arr
         near, _, normals, clear = look(space, tables.body, posed, turn, place)
         touching = near[7:] < 2.0 * TOUCH_M
         opposed = -float(normals[6] @ normals[7:][touching].mean(axis=0)) if touching.any() else 0.0
-        kept.append((value[row] + 0.7 * opposed * (near[6] < 2.0 * TOUCH_M) + min(clear + 0.002, 0.0) / 0.002, posed))
+        tip = worth * opposed * (near[6] < 2.0 * TOUCH_M)
+        kept.append((value[row] + tip + min(clear + 0.002, 0.0) / 0.002, posed))
     kept.sort(key=lambda entry: -entry[0])
     return [posed for _, posed in kept[:THUMBS]]
 
@@ -161,6 +180,26 @@ def _settled(
     if not carried(cone_columns(on_surface, normals[touching], centre), proposal.downs).all():
         return None, "does not carry the object"
     return Grasp(proposal.kind, turned, moved, posed, proposal.along, touching, proposal.downs), ""
+
+
+def shifted_grasp(tables: Tables, space: Space, grasp: Grasp, rng: Generator) -> Grasp | None:
+    """The same grasp after a small motion of the wrist, or nothing if the fingers cannot follow it.
+
+    The fingers that touch go on touching, about where they did; the others stay as they are.
+    """
+    turn = np.ascontiguousarray(grasp.turn @ _rotation(rng.normal(0.0, SHIFT_RAD, 3)))
+    place = grasp.place + rng.normal(0.0, SHIFT_M, 3)
+    stiff = np.concatenate([np.full(20, 1.0 / 0.3), np.full(6, 1e6)])
+    stiff[5::4] = 1.0 / 0.12
+    angles = settle(space, tables.body, grasp.angles, turn, place, grasp.touching.astype(float), stiff, _ROUNDS)[
+        :20
+    ].copy()
+    gaps, _, _, clear = look(space, tables.body, angles, turn, place)
+    touched = np.any(grasp.touching[4:].reshape(5, 3), axis=1)
+    off = np.min(gaps[4:].reshape(5, 3), axis=1)[touched].max(initial=0.0) > 2.0 * TOUCH_M
+    if off or gaps.min() < -DEEPEST_M or clear < -OVERLAP_M:
+        return None
+    return replace(grasp, turn=turn, place=place, angles=angles)
 
 
 def _rotation(vector: Array) -> Array:

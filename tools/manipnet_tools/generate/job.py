@@ -60,7 +60,7 @@ def hand_of(number: int, seed: int) -> Hand:
 def make_take(number: int, seed: int) -> MadeTake:
     """One take of one object by hands of one kind."""
     started = time.process_time()
-    hand_number = 0 if number % 4 == 0 else 1 + number % (HANDS - 1)
+    hand_number = 0 if number % 8 == 0 else 1 + number % (HANDS - 1)
     tables, pinches = _tables(hand_number, seed)
     for turn in range(10):
         rng = np.random.default_rng([seed, number, turn])

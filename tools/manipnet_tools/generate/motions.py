@@ -59,6 +59,18 @@ class Hold:
     opened: Array
     back: Array
     near_only: bool = False
+    shifts: tuple["Shift", ...] = ()
+    """Between contact and release, one after the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """A small motion of a hand that holds: to the wrist pose `(7,)` in the object's frame, and to angles `(A,)`."""
+
+    start_s: float
+    end_s: float
+    pose: Array
+    angles: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +124,7 @@ def _wrist(time_s: Array, obj: Array, holds: Sequence[Hold], side: Side, shape: 
             far,
             [
                 Move(hold.contact_s - 0.45 * reach, hold.contact_s, grasp),
+                *(Move(shift.start_s, shift.end_s, shift.pose) for shift in hold.shifts),
                 Move(hold.release_s, hold.release_s + 0.5 * leave, far),
             ],
         )
@@ -210,7 +223,7 @@ def _fingers(time_s: Array, holds: Sequence[Hold], limits: Array, rng: Generator
             closing = hold.contact_s - rng.uniform(0.3, 0.4) * reach
             closed = ease(time_s, closing + lag, hold.contact_s + rng.uniform(0.0, 0.1) + lag)
             closed -= ease(time_s, hold.release_s + lag - 0.05, hold.release_s + 0.45 * leave + lag)
-            target = hold.opened[own] if hold.near_only else hold.angles[own]
+            target = hold.opened[own] if hold.near_only else _held_angles(time_s, hold)[:, own]
             angles[:, own] += open_share[:, None] * (opened - angles[:, own])
             angles[:, own] += np.clip(closed, 0.0, 1.0)[:, None] * (target - angles[:, own])
         if not hold.near_only:
@@ -222,6 +235,15 @@ def _fingers(time_s: Array, holds: Sequence[Hold], limits: Array, rng: Generator
     life = _life(time_s, count, 1.0, rng, _LIFE_HZ)
     angles += life * (quiet * _HELD_LIFE_RAD + (1.0 - quiet) * _FREE_LIFE_RAD)[:, None]
     return np.clip(angles, *limits.T)
+
+
+def _held_angles(time_s: Array, hold: Hold) -> Array:
+    """Angles `(T, A)` of a hand that holds, with its shifts."""
+    angles, before = np.tile(hold.angles, (len(time_s), 1)), hold.angles
+    for shift in hold.shifts:
+        angles += ease(time_s, shift.start_s, shift.end_s)[:, None] * (shift.angles - before)
+        before = shift.angles
+    return angles
 
 
 def _idle(limits: Array, rng: Generator) -> Array:

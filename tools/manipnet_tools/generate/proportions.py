@@ -11,8 +11,8 @@ from manipnet.synthesis.hand.kinematics import forward_kinematics
 
 HANDS: Final = 24
 """How many hands a set is made with; the first is the free hand itself."""
-_SIZES, _FINGERS, _THICKNESSES = (0.85, 1.2), (0.9, 1.1), (0.9, 1.2)
-_WRIST_M: Final = 0.012
+_SIZES, _FINGERS, _THICKNESSES = (0.88, 1.26), (0.9, 1.1), (0.9, 1.2)
+_WRIST_M: Final = 0.015
 """Rigs and trackers put the wrist this far from where anatomy has it."""
 _LEANS: Final = (-0.25, 0.05)
 """Radians; fingers at rest lean away from the thumb, some people's more than others'."""

@@ -27,8 +27,11 @@ FACING: Final = 0.75
 WIDEST_HELD_M: Final = 0.13
 """One hand does not reach around what is wider everywhere."""
 CONE_RAD: Final = np.radians(30.0)
-_SPARED: Final = (0.45, 0.2, 0.35)
-"""How often no finger, the little finger, or the last two stay away: people hold small bodies with fewer."""
+ONE_SIDED: Final = ("flat", "press")
+"""Kinds in which all digits press from the same side."""
+_FARTHEST_M: Final = 0.04
+"""People hold with the fingers that are near: a ring or little finger takes part less often, the farther its knuckle is
+from the object, and never beyond this."""
 _POWER, _PRECISE, _HOOK, _FLAT = (0.6, 1.0, 1.2), (0.0, 0.15, 2.0), (0.8, 1.2, 1.0), (0.5, 0.5, 0.6)
 
 
@@ -49,6 +52,9 @@ class Proposal:
     downs: Array
     """`(n, 3)` the directions of gravity in which it has to hold: all, about one for a hook or a flat hand, or none for
     a hand that holds only together with another."""
+    nearest_m: float = np.inf
+    """The little finger stays away if its knuckle is farther from the object than this, and the ring finger too if both
+    are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +176,8 @@ def _around(tables: Tables, site: Site, kind: str, rng: Generator) -> Proposal:
     wanted = np.array([thumb, *[_HOOK if hooked else _POWER] * 4])
     upright = hooked or (site.kind == "bar" and rng.random() < 0.7)
     down = turn[:, 0] if hooked else np.array([0.0, -1.0, 0.0])
-    return Proposal(kind, turn, place, wanted, (1, 2), -turn[:, 2], cone(down) if upright else SIDES)
+    near = rng.uniform(0.0, _FARTHEST_M)
+    return Proposal(kind, turn, place, wanted, (1, 2), -turn[:, 2], cone(down) if upright else SIDES, near)
 
 
 def _pinched(pinches: Pinches, held: tuple[Array, Array, Array, float], kind: str, rng: Generator) -> Proposal | None:
@@ -215,10 +222,9 @@ def _on_surface(tables: Tables, corners: Array, kind: str, rng: Generator) -> Pr
     row = {"above": _PRECISE, "palm": _POWER, "flat": _FLAT}[kind]
     wanted = np.array([row] * 5) * (1.0 if kind != "flat" else np.array([0.3, 1, 1, 1, 1])[:, None])
     flat = kind == "flat"
-    if not flat:
-        wanted[5 - int(rng.choice(3, p=_SPARED)) :] = 0.0
     downs = cone(turn[:, 2]) if flat else SIDES
-    return Proposal(kind, turn, point - turn @ at, wanted, () if flat else (0, 1, 2), -z, downs)
+    near = np.inf if flat else rng.uniform(0.0, _FARTHEST_M)
+    return Proposal(kind, turn, point - turn @ at, wanted, () if flat else (0, 1, 2), -z, downs, near)
 
 
 def cone(down: Array) -> Array:

@@ -19,7 +19,7 @@ from manipnet.geometry import (
 )
 from manipnet_tools.assets.minimum_jerk import Move
 from manipnet_tools.generate.bank import Held, apart, of_side
-from manipnet_tools.generate.motions import Hold, Scene
+from manipnet_tools.generate.motions import Hold, Scene, Shift
 from manipnet_tools.generate.proposals import CONE_RAD
 
 EVENTS: Final = ("lift", "hand over", "together", "near", "idle")
@@ -68,7 +68,7 @@ class Director:
         if grasp is None:
             return self._press(now)
         contact = now + rng.uniform(0.6, 1.2)
-        release = contact + rng.uniform(2.0, 6.0)
+        release = contact + rng.uniform(1.5, 4.5)
         self._carry(contact + rng.uniform(0.03, 0.2), release - rng.uniform(0.05, 0.15), [grasp], lands=True)
         return self._hold("lift", grasp, now, contact, release)
 
@@ -93,7 +93,7 @@ class Director:
         if first is None or second is None:
             return self._lift(now, sides)
         contact, lag = now + rng.uniform(0.6, 1.1), rng.uniform(0.0, 0.5)
-        release = contact + lag + rng.uniform(2.0, 6.0)
+        release = contact + lag + rng.uniform(1.5, 4.5)
         self._carry(contact + lag + 0.1, release - 0.1, [first, second], lands=True)
         done = self._hold("together", first, now, contact, release)
         return max(done, self._hold("together", second, now + lag, contact + lag, release - rng.uniform(0.0, 0.3)))
@@ -107,7 +107,7 @@ class Director:
         drawn = [pairs[int(k)] for k in rng.choice(len(pairs), min(3, len(pairs)), replace=False)]
         pair = max(drawn, key=lambda both: sum(self._ease(grasp, self._pose[3:]) for grasp in both))
         contact = now + rng.uniform(0.7, 1.2)
-        release = contact + rng.uniform(2.0, 6.0)
+        release = contact + rng.uniform(1.5, 4.5)
         self._carry(contact + rng.uniform(0.1, 0.25), release - rng.uniform(0.05, 0.15), pair, lands=True)
         return max(self._hold("together", grasp, now, contact, release) for grasp in pair)
 
@@ -136,6 +136,7 @@ class Director:
                 grasp.opened,
                 grasp.back,
                 event == "near",
+                () if event == "near" else self._shifts(grasp, contact, release),
             )
         )
         self.events.append(
@@ -148,6 +149,18 @@ class Director:
             }
         )
         return away
+
+    def _shifts(self, grasp: Held, contact: float, release: float) -> tuple[Shift, ...]:
+        """The wrist wanders about its grasp, and the fingers follow."""
+        rng, near = self._rng, [(grasp.pose, grasp.angles), *grasp.shifts]
+        shifts: list[Shift] = []
+        now = contact + float(rng.uniform(0.1, 0.6))
+        while len(near) > 1 and now < release - 0.5:
+            pose, angles = near[int(rng.integers(len(near)))]
+            end = min(now + float(rng.uniform(0.25, 0.8)), release - 0.1)
+            shifts.append(Shift(now, end, pose, angles))
+            now = end + float(rng.uniform(0.0, 0.8))
+        return tuple(shifts)
 
     def _reachable(self, side: Side) -> Held | None:
         """A grasp of the object as it is now, with the forearm on the person's side and above the table."""
@@ -182,7 +195,7 @@ class Director:
         rng, now = self._rng, start
         first = True
         while now < end - 0.35:
-            length = float(rng.uniform(0.4, 1.0))
+            length = float(rng.uniform(0.5, 1.5))
             last = lands and now + 1.4 * length > end - 0.35
             stop = end if last else min(now + length, end)
             if last:

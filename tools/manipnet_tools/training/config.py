@@ -53,6 +53,8 @@ class TrainConfig:
     """A round has at most so many samples; from long takes, each round draws others."""
     warp: float = 0.2
     """Time is played faster or slower by a factor up to exp of this."""
+    sliding: float = 0.0
+    """Share of the samples in which the object also moves in the hand, which generated hands never do by themselves."""
     time_reversed: bool = False
     """Learn every take played backwards as well."""
     seed: int = 0
@@ -63,6 +65,8 @@ class TrainConfig:
         for name, least in (_LEAST | {"round_samples": self.batch}).items():
             if (value := getattr(self, name)) < least:
                 raise ConfigError(f"--training.{name.replace('_', '-')} is {value}; it must be at least {least}")
+        if not 0.0 <= self.sliding <= 1.0:
+            raise ConfigError(f"--training.sliding is {self.sliding:g}; it must be from 0 to 1")
         if self.captured + self.blended <= 0.0 or min(self.captured, self.blended, self.on_policy) < 0.0:
             raise ConfigError(
                 "--training.captured, --training.blended and --training.on-policy must not be negative, and one of the "

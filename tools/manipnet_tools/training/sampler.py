@@ -98,11 +98,13 @@ class RoundSampler:
             for share, pool in ((config.captured, None), (config.blended, part.pool)):
                 if count := int(share * part.thinned * (high - low)):
                     frames = rng.integers(low, high, count)
-                    samples.append(captured_samples(captured, frames, pool, rule, part.limits, rng, config.warp))
+                    samples.append(
+                        captured_samples(captured, frames, pool, rule, part.limits, rng, config.warp, config.sliding)
+                    )
         return samples
 
     def _on_policy(self, part: _Part, model: ManipNet, rule: AnswerRule) -> list[Samples]:
-        ticks, rng = self._config.roll_out_ticks, self._rng
+        ticks, sliding, rng = self._config.roll_out_ticks, self._config.sliding, self._rng
         wanted = self._config.on_policy * part.thinned * sum(high - low for low, high in part.spans) / ticks
         rolled = np.flatnonzero([high - low > TICK_FRAMES * ticks for low, high in part.spans])
         if not len(rolled):
@@ -112,7 +114,7 @@ class RoundSampler:
         hands, spans = [part.hands[k] for k in rolled], [part.spans[k] for k in rolled]
         starts = [max(int(wanted / len(rolled)), 1)] * len(rolled)
         policy = policy_of(model)
-        return [on_policy_samples(hands, spans, policy, starts, ticks, rule, part.pool, part.limits, rng)]
+        return [on_policy_samples(hands, spans, policy, starts, ticks, rule, part.pool, part.limits, rng, sliding)]
 
 
 def _long_enough(takes: TakeSet, share: float) -> TakeSet:
