@@ -5,6 +5,7 @@ The same code runs live, in replay, offline, in training and in evaluation.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.features import Windows, rays_of, sense
 from manipnet.synthesis.model.layout import PRESENT, WINDOW
 from manipnet.synthesis.objects.shape import Shape
+from manipnet.synthesis.side_by_side import SideBySide, part_count
 
 ABSENT_HAND_M = 0.45
 """Distance at which a hand that is not tracked is assumed to be."""
@@ -148,6 +150,7 @@ class Synthesizer:
         """
         self._bundle, self._pose, self._on_stage = bundle, pose_kernel(solver), on_stage
         self._batches: dict[int, _Batch] = {}
+        self._threads = SideBySide()
 
     @property
     def hand(self) -> Hand:
@@ -171,37 +174,23 @@ class Synthesizer:
         for n, index in enumerate(order):
             batch.put(n, scenes[index], states[index])
             poses.correction[n], poses.grip[n] = states[index].correction, states[index].grip
-        groups = _groups([scenes[index].shape for index in order])
-        for shape, first, last in groups:
-            sense(
-                hand,
-                layout,
-                shape,
-                batch.windows,
-                batch.positions,
-                batch.rotations,
-                first,
-                last,
-                batch.rays,
-                batch.rows,
-            )
+        parts = _parts([scenes[index].shape for index in order], len(batch.rays))
+
+        def sense_part(part: int) -> None:
+            for shape, first, last in parts[part]:
+                inputs = batch.windows, batch.positions, batch.rotations
+                sense(hand, layout, shape, *inputs, first, last, batch.rays[part], batch.rows)
+
+        def pose_part(part: int) -> None:
+            network = outputs, batch.angles, bundle.response, bundle.limits
+            for shape, first, last in parts[part]:
+                self._pose(hand.packed, layout.output_starts, shape.solid, batch.windows, *network, first, last, poses)
+
+        self._threads.run(sense_part, len(parts))
         self._on_stage("sense")
         outputs = bundle.infer(batch.rows)
         self._on_stage("infer")
-        for shape, first, last in groups:
-            self._pose(
-                hand.packed,
-                layout.output_starts,
-                shape.solid,
-                batch.windows,
-                outputs,
-                batch.angles,
-                bundle.response,
-                bundle.limits,
-                first,
-                last,
-                poses,
-            )
+        self._threads.run(pose_part, len(parts))
         steps = dict(zip(order, _steps(poses), strict=True))
         self._on_stage("ik")
         return [steps[index] for index in range(count)]
@@ -213,7 +202,8 @@ class _Batch:
     def __init__(self, bundle: Bundle, count: int) -> None:
         self.windows = _allocate_windows(count)
         self.angles, self.positions, self.rotations = allocate_poses(bundle.hand, count)[:3]
-        self.rays = rays_of(bundle.hand, count)
+        self.rays = [rays_of(bundle.hand, count) for _ in range(part_count(count))]
+        """For each part of the batch that is sensed by a thread of its own."""
         self.rows = np.empty((count, bundle.layout.input_size), np.float32)
 
     def put(self, n: int, scene: HandScene, state: HandState) -> None:
@@ -222,10 +212,19 @@ class _Batch:
         self.angles[n], self.positions[n], self.rotations[n] = state.angles, state.positions, state.rotations
 
 
-def _groups(shapes: Sequence[Shape]) -> list[tuple[Shape, int, int]]:
-    """Stretches of hands about the same shape: the shape, the first hand, one past the last."""
-    starts = [n for n, shape in enumerate(shapes) if n == 0 or shape is not shapes[n - 1]]
-    return [(shapes[first], first, last) for first, last in zip(starts, [*starts[1:], len(shapes)], strict=True)]
+_Group = tuple[Shape, int, int]
+"""Neighbouring hands about the same shape: the shape, the first hand, one past the last."""
+
+
+def _parts(shapes: Sequence[Shape], count: int) -> list[list[_Group]]:
+    """The hands about these shapes in `count` parts of about the same size, each in groups."""
+    cuts = [len(shapes) * part // count for part in range(count + 1)]
+    return [_groups(shapes, begin, end) for begin, end in pairwise(cuts)]
+
+
+def _groups(shapes: Sequence[Shape], begin: int, end: int) -> list[_Group]:
+    starts = [n for n in range(begin, end) if n == begin or shapes[n] is not shapes[n - 1]]
+    return [(shapes[first], first, last) for first, last in pairwise([*starts, end])]
 
 
 def _steps(poses: Poses) -> Iterator[HandStep]:
