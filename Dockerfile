@@ -8,7 +8,7 @@ COPY server server
 COPY tools tools
 COPY models models
 RUN pip install --no-cache-dir -c constraints.txt . ./models
-# The first start of a container finds the kernels compiled; only a processor from before 2013 compiles its own.
+# Installing has compiled the kernels for the newest numba; this does so for the one of constraints.txt if that is another.
 RUN MANIPNET_CACHE=/tmp/manipnet python -m manipnet.runtime.precompile && rm -r /tmp/manipnet
 
 USER manipnet
