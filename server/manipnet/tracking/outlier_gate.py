@@ -4,11 +4,13 @@ A rejected body is passed on as not tracked, with the reason as its `fault`; the
 body. The timeline deals with time that goes backwards and with duplicate and late frames. No clock, no I/O.
 """
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import Final
 
+import numpy as np
+
+from manipnet.geometry import Array
+from manipnet.jit import inner, kernel
 from manipnet.wire.bodies import BodyFrame, BodySample
 
 MAX_SPEED_M_S: Final = 20.0
@@ -35,154 +37,239 @@ MOVING_S: Final = 0.1
 """A body is frozen if it has not changed for `FROZEN_S` while others of its sender did within `MOVING_S`."""
 MAX_BODIES: Final = 1_024
 
-Key = tuple[str, int | None, str | None]
-Vector = tuple[float, float, float]
+FAULTS: Final = ("jump", "swap", "zeros", "frozen")
+"""Why a body is rejected; kernels count them from 1, and 0 is no fault."""
+_JUMP, _SWAP, _ZEROS, _FROZEN = 1, 2, 3, 4
 
+Key = tuple[int | None, str | None]
+"""Id and name of a body."""
+_key = itemgetter(BodySample._fields.index("id"), BodySample._fields.index("name"))
 
-@dataclass(slots=True)
-class _History:
-    """The newest accepted sample of one body, the place it may have jumped to, and what is known of its noise."""
+HISTORY: Final = np.dtype(
+    [
+        ("is_known", "i8"),
+        ("t_s", "f8"),
+        ("pose", "f8", (7,)),
+        ("jumped_s", "f8"),
+        ("has_candidate", "i8"),
+        ("candidate_s", "f8"),
+        ("candidate", "f8", (7,)),
+        ("step", "f8", (3,)),
+        ("noise_turns", "i8", (3,)),
+        ("has_noise", "i8"),
+        ("changed_s", "f8"),
+    ]
+)
+"""One body: its newest accepted sample, the place it may have jumped to, and what is known of its noise.
 
-    t_s: float
-    sample: BodySample
-    jumped_s: float = 0.0
-    candidate: tuple[float, BodySample] | None = None
-    step: Vector = (0.0, 0.0, 0.0)
-    noise_turns: list[int] = field(default_factory=lambda: [0, 0, 0])
-    """By axis, how many more small steps were back than forth."""
-    has_noise: bool = False
-    changed_s: float = field(default=-math.inf)
+`noise_turns` are, by axis, how many more small steps were back than forth.
+"""
+_FIRST_ROOM: Final = 16
 
 
 class OutlierGate:
     """Judges the bodies of any number of senders, each by its own past. Not thread-safe."""
 
     def __init__(self) -> None:
-        self._histories: dict[Key, _History] = {}
-        self._moved_s: dict[str, float] = {}
+        self._histories = np.zeros(_FIRST_ROOM, HISTORY)
+        self._forget()
 
     @property
     def known_bodies(self) -> int:
         """The number of bodies whose past is known, at most `MAX_BODIES`."""
-        return len(self._histories)
+        return len(self._rows)
 
     def check(self, frame: BodyFrame) -> tuple[BodyFrame, list[str]]:
         """The frame with impossible bodies made untracked, and the reasons, of `telemetry.BODY_REASONS`."""
-        keys = [(frame.source, body.id, body.name) for body in frame.bodies]
-        swapped = self._swapped(frame, keys)
-        bodies = [
-            self._judge(frame, key, body, body in swapped) if body.tracked else body
-            for key, body in zip(keys, frame.bodies, strict=True)
-        ]
-        reasons = [body.fault for body in bodies if body.fault is not None]
-        return (frame._replace(bodies=tuple(bodies)) if reasons else frame), reasons
-
-    def _judge(self, frame: BodyFrame, key: Key, body: BodySample, swapped: bool) -> BodySample:
-        history = self._histories.get(key)
-        if history is None:
-            if len(self._histories) >= MAX_BODIES:
-                self._histories.clear()
-                self._moved_s.clear()
-            self._histories[key] = _History(frame.t_s, body, changed_s=frame.t_s)
-            return body
-        # If nothing moves, a recording has ended or is paused, and no single body is frozen.
-        others_move = frame.t_s - self._moved_s.get(frame.source, frame.t_s) < MOVING_S
-        fault = _fault(history, frame.t_s, body, swapped, others_move)
-        if history.changed_s == frame.t_s:
+        bodies = frame.bodies
+        if not bodies:
+            return frame, []
+        rows = self._rows_of(frame.source, [*map(_key, bodies)])
+        poses = np.array([body.p + body.q for body in bodies], np.float64)
+        faults = np.array([not body.tracked for body in bodies], np.int8)
+        moved_s = self._moved_s.get(frame.source, frame.t_s)
+        if _judge(self._histories, rows, poses, frame.t_s, moved_s, faults):
             self._moved_s[frame.source] = frame.t_s
-        return body if fault is None else body._replace(tracked=False, fault=fault)
+        if faults.any():
+            bodies = tuple(map(_with_fault, bodies, faults.tolist()))
+            frame = frame._replace(bodies=bodies)
+        return frame, [body.fault for body in bodies if body.fault is not None]
 
-    def _swapped(self, frame: BodyFrame, keys: Sequence[Key]) -> Sequence[BodySample]:
-        """Bodies that exchanged their places in one step, as they do when a tracker confuses two of them."""
-        fast: list[tuple[BodySample, Vector]] = []
-        for key, body in zip(keys, frame.bodies, strict=True):
-            history = self._histories.get(key) if body.tracked else None
-            if history is None or not 0.0 < frame.t_s - history.t_s < CONFIRM_S:
+    def _forget(self) -> None:
+        self._histories[:] = 0
+        self._rows: dict[tuple[str, Key], int] = {}
+        self._layouts: dict[str, tuple[list[Key], np.ndarray]] = {}
+        """By sender, the bodies of its newest frame and the rows of their histories."""
+        self._moved_s: dict[str, float] = {}
+
+    def _rows_of(self, source: str, keys: list[Key]) -> np.ndarray:
+        """The rows of the histories of a sender's bodies. Most frames have the same bodies as the one before."""
+        known, rows = self._layouts.get(source, (None, _NO_ROWS))
+        if known == keys:
+            return rows
+        if len(self._rows) + len(keys) > MAX_BODIES:
+            self._forget()
+        rows = np.array([self._rows.setdefault((source, key), len(self._rows)) for key in keys], np.intp)
+        if len(self._rows) > len(self._histories):
+            more = np.zeros(2 * len(self._rows) - len(self._histories), HISTORY)
+            self._histories = np.concatenate([self._histories, more])
+        self._layouts[source] = keys, rows
+        return rows
+
+
+_NO_ROWS: Final = np.empty(0, np.intp)
+
+
+def _with_fault(body: BodySample, fault: int) -> BodySample:
+    """A tracked body with its fault, by number."""
+    return body._replace(tracked=False, fault=FAULTS[fault - 1]) if body.tracked and fault else body
+
+
+@kernel
+def _judge(histories: np.ndarray, rows: np.ndarray, poses: Array, t_s: float, moved_s: float, faults: np.ndarray):
+    """Judge the bodies `poses (n, 7)` of one frame by their histories, and update those.
+
+    `faults (n,)` are not zero for bodies that are not tracked, which are left out; the faults of others are written
+    into it. `moved_s` is when a body of the sender changed last. Returns whether one has changed now.
+    """
+    _find_swaps(histories, rows, poses, t_s, faults)
+    changed = False
+    for i in range(len(rows)):
+        history, pose = histories[rows[i]], poses[i]
+        if faults[i] > 0:
+            continue
+        swapped = faults[i] < 0
+        faults[i] = 0
+        if history.is_known == 0:
+            history.is_known = 1
+            history.changed_s = t_s
+            _accept(history, t_s, t_s, pose)
+            continue
+        # If nothing moves, a recording has ended or is paused, and no single body is frozen.
+        others_move = (0.0 if changed else t_s - moved_s) < MOVING_S
+        faults[i] = _fault(history, t_s, pose, swapped, others_move)
+        changed = changed or history.changed_s == t_s
+    return changed
+
+
+@inner
+def _find_swaps(histories: np.ndarray, rows: np.ndarray, poses: Array, t_s: float, faults: np.ndarray):
+    """Make the faults of bodies -1 that exchanged their places in one step, as they do when a tracker confuses two."""
+    for i in range(len(rows)):
+        if faults[i] > 0 or not _is_fast(histories[rows[i]], poses[i], t_s):
+            continue
+        for j in range(i):
+            if faults[j] > 0 or not _is_fast(histories[rows[j]], poses[j], t_s):
                 continue
-            if math.dist(body.p, history.sample.p) > SWAP_SPEED_M_S * (frame.t_s - history.t_s):
-                fast.append((body, history.sample.p))
-        if len(fast) < 2:
-            return ()
-        return [
-            one
-            for one, p_one in fast
-            for other, p_other in fast
-            if other is not one
-            and max(math.dist(one.p, p_other), math.dist(other.p, p_one)) < SWAP_RATIO * math.dist(p_one, p_other)
-        ]
+            one, other = histories[rows[i]].pose, histories[rows[j]].pose
+            if max(_dist(poses[i], other), _dist(poses[j], one)) < SWAP_RATIO * _dist(one, other):
+                faults[i] = faults[j] = -1
 
 
-def _fault(history: _History, t_s: float, body: BodySample, swapped: bool, others_move: bool) -> str | None:
-    """Why a tracked sample cannot be real, or None; updates the history."""
+@inner
+def _is_fast(history, pose: Array, t_s: float):
+    """Whether a body moved so fast that it may have been taken for another."""
+    elapsed_s = t_s - history.t_s
+    recent = history.is_known == 1 and 0.0 < elapsed_s < CONFIRM_S
+    return recent and _dist(pose, history.pose) > SWAP_SPEED_M_S * elapsed_s
+
+
+@inner
+def _fault(history, t_s: float, pose: Array, swapped: bool, others_move: bool):
+    """Why a tracked sample cannot be real, or 0; updates the history."""
     elapsed_s = t_s - history.t_s
     if elapsed_s < -FORGET_S:
-        _accept(history, t_s, body)
-        return None
-    if body.p == (0.0, 0.0, 0.0) and math.dist(body.p, history.sample.p) > MARGIN_M:
-        return "zeros"
-    if _is_still(history, t_s, body) and others_move:
-        return "frozen"
+        _accept(history, t_s, t_s, pose)
+        return 0
+    if pose[0] == 0.0 and pose[1] == 0.0 and pose[2] == 0.0 and _dist(pose, history.pose) > MARGIN_M:
+        return _ZEROS
+    if _is_still(history, t_s, pose) and others_move:
+        return _FROZEN
     if elapsed_s > FORGET_S:
-        _accept(history, t_s, body)
-        return None
-    if not swapped and _is_near(history.sample, body, abs(elapsed_s)) and _is_back(history, body):
-        _accept(history, t_s, body)
-        return None
-    if history.candidate is None or not _is_near(history.candidate[1], body, abs(t_s - history.candidate[0])):
+        _accept(history, t_s, t_s, pose)
+        return 0
+    if not swapped and _is_near(history.pose, pose, abs(elapsed_s)) and _is_back(history, pose):
+        _accept(history, t_s, history.t_s, pose)
+        return 0
+    if history.has_candidate == 0 or not _is_near(history.candidate, pose, abs(t_s - history.candidate_s)):
         history.jumped_s = t_s
-    history.candidate = (t_s, body)
+    history.has_candidate = 1
+    history.candidate_s = t_s
+    _copy(pose, history.candidate)
     if t_s - history.jumped_s < CONFIRM_S:
-        return "swap" if swapped else "jump"
-    _accept(history, t_s, body)
-    return None
+        return _SWAP if swapped else _JUMP
+    _accept(history, t_s, history.t_s, pose)
+    return 0
 
 
-def _accept(history: _History, t_s: float, body: BodySample) -> None:
-    if abs(t_s - history.t_s) > FORGET_S or t_s >= history.t_s:  # a late sample is accepted but is not the newest
-        history.t_s, history.sample = t_s, body
-    history.candidate = None
+@inner
+def _accept(history, t_s: float, newest_s: float, pose: Array):
+    if t_s >= newest_s:  # a late sample is accepted but is not the newest
+        history.t_s = t_s
+        _copy(pose, history.pose)
+    history.has_candidate = 0
 
 
-def _is_near(known: BodySample, body: BodySample, elapsed_s: float) -> bool:
-    """Whether a body can have moved from a known sample to a new one within `elapsed_s`."""
-    if math.dist(known.p, body.p) > MARGIN_M + MAX_SPEED_M_S * elapsed_s:
+@inner
+def _is_near(known: Array, pose: Array, elapsed_s: float):
+    """Whether a body can have moved from a known pose to a new one within `elapsed_s`."""
+    if _dist(known, pose) > MARGIN_M + MAX_SPEED_M_S * elapsed_s:
         return False
-    return _angle(known, body) <= MARGIN_RAD + MAX_SPIN_RAD_S * elapsed_s
+    return _angle(known, pose) <= MARGIN_RAD + MAX_SPIN_RAD_S * elapsed_s
 
 
-def _is_back(history: _History, body: BodySample) -> bool:
+@inner
+def _is_back(history, pose: Array):
     """Whether a body that jumped is nearer to where it came from than to where it went."""
-    return history.candidate is None or _distance_m(history.sample, body) < _distance_m(history.candidate[1], body)
+    return history.has_candidate == 0 or _distance_m(history.pose, pose) < _distance_m(history.candidate, pose)
 
 
-def _is_still(history: _History, t_s: float, body: BodySample) -> bool:
+@inner
+def _is_still(history, t_s: float, pose: Array):
     """Whether a body with noise has been bit-identical for long; learns the noise.
 
     A body without noise is computed, not tracked, such as a recorded prop on a table; it may be still.
     """
-    if body.p == history.sample.p and body.q == history.sample.q:
-        return history.has_noise and t_s - history.changed_s > FROZEN_S
-    if not history.has_noise:
-        _learn_noise(history, body)
+    same = True
+    for k in range(7):
+        same = same and pose[k] == history.pose[k]
+    if same:
+        return history.has_noise == 1 and t_s - history.changed_s > FROZEN_S
+    if history.has_noise == 0:
+        _learn_noise(history, pose)
     history.changed_s = t_s
     return False
 
 
-def _learn_noise(history: _History, body: BodySample) -> None:
-    (x, y, z), (known_x, known_y, known_z) = body.p, history.sample.p
-    step, turns = (x - known_x, y - known_y, z - known_z), history.noise_turns
-    for axis, (one, before) in enumerate(zip(step, history.step, strict=True)):
+@inner
+def _learn_noise(history, pose: Array):
+    for axis in range(3):
+        one, before, turns = pose[axis] - history.pose[axis], history.step[axis], history.noise_turns
         if NOISE_M[0] < abs(one) < NOISE_M[1]:
             turns[axis] = turns[axis] + 1 if one * before < 0.0 else max(turns[axis] - 1, 0)
-    history.has_noise = max(turns) >= NOISE_TURNS
-    history.step = step
+            if turns[axis] >= NOISE_TURNS:
+                history.has_noise = 1
+        history.step[axis] = one
 
 
-def _angle(one: BodySample, other: BodySample) -> float:
-    (ax, ay, az, aw), (bx, by, bz, bw) = one.q, other.q  # a loop would take four times as long
-    return 2.0 * math.acos(min(abs(ax * bx + ay * by + az * bz + aw * bw), 1.0))
+@inner
+def _copy(pose: Array, out: Array):
+    for k in range(7):
+        out[k] = pose[k]
 
 
-def _distance_m(one: BodySample, other: BodySample) -> float:
+@inner
+def _dist(one: Array, other: Array):
+    return np.sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 + (one[2] - other[2]) ** 2)
+
+
+@inner
+def _angle(one: Array, other: Array):
+    cosine = abs(one[3] * other[3] + one[4] * other[4] + one[5] * other[5] + one[6] * other[6])
+    return 2.0 * np.arccos(min(cosine, 1.0))
+
+
+@inner
+def _distance_m(one: Array, other: Array):
     """Position and rotation in one measure: the rim of a body is about a decimetre from its centre."""
-    return math.dist(one.p, other.p) + 0.1 * _angle(one, other)
+    return _dist(one, other) + 0.1 * _angle(one, other)
