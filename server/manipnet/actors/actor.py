@@ -1,6 +1,6 @@
 """One actor: its tracked bodies come in, its two hands go out, tick by tick."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from manipnet.tracking.tick import TICK_S, BodyAtTick, BodyHealth, Tick
 from manipnet.tracking.timecodes import Timecode, Timecodes
 from manipnet.tracking.timeline import Timeline
 from manipnet.wire import SIDES, Side, State
-from manipnet.wire.bodies import BodyFrame
+from manipnet.wire.bodies import BodyFrame, BodySample
 
 
 class Actor:
@@ -77,12 +77,13 @@ class Actor:
         """How many ticks were not shown because they fell due all at once or a sender restarted."""
         return self._timeline.skipped_late + self._timeline.skipped_at_restart
 
-    def push(self, frame: BodyFrame) -> str | None:
+    def push(self, frame: BodyFrame, bodies: Mapping[BodyKey, BodySample] | None = None) -> str | None:
         """Take this actor's bodies from a frame; returns why none of them was used, or None.
 
-        The reasons are those of `Timeline.push`, and unknown_body.
+        `bodies` are `frame.by_key()`, which several actors share. The reasons are those of `Timeline.push`, and
+        unknown_body.
         """
-        poses = self._roles.poses(frame)
+        poses = self._roles.poses(frame.by_key() if bodies is None else bodies)
         if not poses:
             return "unknown_body"
         if frame.timecode is not None:

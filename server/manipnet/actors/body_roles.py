@@ -3,13 +3,14 @@
 A role is `left_wrist`, `right_wrist` or the name of a prop.
 """
 
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
 
 from manipnet.config.settings import ActorConfig, BodyKey
 from manipnet.geometry import Array, compose
-from manipnet.wire.bodies import BodyFrame, BodySample
+from manipnet.wire.bodies import BodySample
 
 NO_OFFSET: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 """The offset of a wrist or prop whose frame is the frame of its body."""
@@ -59,14 +60,15 @@ class BodyRoles:
         """Change the offset T_body_role `(7,)`."""
         self._offsets[role] = offset
 
-    def poses(self, frame: BodyFrame) -> dict[str, Array | None]:
-        """World poses `(7,)` by role of the bodies in a frame that have one; None for a body that is not tracked."""
+    def poses(self, bodies: Mapping[BodyKey, BodySample]) -> dict[str, Array | None]:
+        """World poses `(7,)` by role of the `bodies` of a frame that have one, from `BodyFrame.by_key`; None for a body
+        that is not tracked."""
         poses: dict[str, Array | None] = {}
-        for sample in frame.bodies:
-            role = self._roles.get(sample.id) if sample.id is not None else None
-            role = role or (self._roles.get(sample.name) if sample.name is not None else None)
-            if role is not None:
-                poses[role] = _pose(sample, self._offsets.get(role)) if sample.tracked else None
+        for key, role in self._roles.items():
+            sample = bodies.get(key)
+            if sample is None or (key == sample.name and sample.id in self._roles and sample.id is not None):
+                continue  # it has another role by its id
+            poses[role] = _pose(sample, self._offsets.get(role)) if sample.tracked else None
         return poses
 
 
@@ -78,5 +80,5 @@ def _same_body(key: BodyKey) -> tuple[BodyKey, ...]:
 
 
 def _pose(sample: BodySample, offset: Array | None) -> Array:
-    pose = np.array([*sample.p, *sample.q])
+    pose = np.array(sample.p + sample.q)
     return pose if offset is None else compose(pose, offset)

@@ -1,15 +1,16 @@
 """From a received frame to the actors: poses that cannot be real are taken out, and every lost frame is counted."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from manipnet.actors.actor import Actor
+from manipnet.config.settings import BodyKey
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.tick_errors import TickErrors
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.outlier_gate import OutlierGate
-from manipnet.wire.bodies import BodyFrame
+from manipnet.wire.bodies import BodyFrame, BodySample
 
 _USED = ""
 _BEST_FIRST: Final = (_USED, "duplicate", "other_sender", "late", "time_jump", "internal", "unknown_body")
@@ -36,7 +37,8 @@ class FrameIntake:
         frame, faults = self._gate.check(frame)
         for fault in faults:
             self._telemetry.count("bodies_rejected", reason=fault)
-        outcome = min([self._push(actor, frame) for actor in self._actors], key=_BEST_FIRST.index)
+        bodies = frame.by_key()
+        outcome = min([self._push(actor, frame, bodies) for actor in self._actors], key=_BEST_FIRST.index)
         if outcome == _USED:
             self._note_useful(frame.source)
             return
@@ -50,9 +52,9 @@ class FrameIntake:
                 self._useful.clear()
             self._useful.add(source)
 
-    def _push(self, actor: Actor, frame: BodyFrame) -> str:
+    def _push(self, actor: Actor, frame: BodyFrame, bodies: Mapping[BodyKey, BodySample]) -> str:
         try:
-            return actor.push(frame) or _USED
+            return actor.push(frame, bodies) or _USED
         except Exception as error:
             self._errors.report("input", error)
             return "internal"

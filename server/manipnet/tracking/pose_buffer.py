@@ -65,32 +65,10 @@ class PoseBuffer:
 
     def add(self, t_s: float, pose: Array | Sequence[float]) -> bool:
         """Insert a tracked pose; returns False, and changes nothing, if there is one at nearly the same instant."""
-        at = self._place(t_s)
-        if at is None:
-            return False
-        if self._count == len(self._times):
-            self._forget()
-            at -= KEEP
-            if at < 0:
-                return False
-        if at < self._count:
-            self._times[at + 1 : self._count + 1] = self._times[at : self._count]
-            self._poses[at + 1 : self._count + 1] = self._poses[at : self._count]
-        self._times[at], self._poses[at] = t_s, pose
-        self._count += 1
-        self._align(at)
-        if t_s - self._estimated_s >= NOISE_EVERY_S:
+        self._count, added = _insert(self._times, self._poses, self._count, t_s, np.asarray(pose, np.float64))
+        if added and t_s - self._estimated_s >= NOISE_EVERY_S:
             self._estimated_s, self.noise = t_s, estimate_noise(self.times, self.poses)
-        return True
-
-    def _place(self, t_s: float) -> int | None:
-        """Where a sample of this time belongs; None if there is one at nearly the same instant."""
-        count = self._count
-        if not count or t_s - self._times[count - 1] >= MIN_SPACING_S:
-            return count
-        at = int(np.searchsorted(self.times, t_s))
-        near = (neighbour for neighbour in (at - 1, at) if 0 <= neighbour < count)
-        return None if any(abs(self._times[k] - t_s) < MIN_SPACING_S for k in near) else at
+        return added
 
     def interval_s(self) -> float:
         """Median spacing of the newest samples; infinite before the second sample."""
@@ -105,20 +83,6 @@ class PoseBuffer:
     def noise_at(self, t_s: float) -> Noise:
         """The noise of the newest samples, which is unknown if the body has been lost for long at `t_s`."""
         return self.noise if self._count and t_s - self._times[self._count - 1] < FORGET_S else UNKNOWN
-
-    def _align(self, at: int) -> None:
-        """Keep neighbouring quaternions in one hemisphere, because trackers may flip their signs."""
-        if at and self._poses[at, 3:] @ self._poses[at - 1, 3:] < 0.0:
-            self._poses[at, 3:] *= -1.0
-        for i in range(at + 1, self._count):
-            if self._poses[i, 3:] @ self._poses[i - 1, 3:] >= 0.0:
-                break
-            self._poses[i, 3:] *= -1.0
-
-    def _forget(self) -> None:
-        self._times[:KEEP] = self._times[KEEP:].copy()
-        self._poses[:KEEP] = self._poses[KEEP:].copy()
-        self._count = KEEP
 
 
 def sample(
@@ -175,6 +139,52 @@ def _count_before(times: Array, t_s: float):
         else:
             high = middle
     return low
+
+
+@kernel
+def _insert(times: Array, poses: Array, count: int, t_s: float, pose: Array):
+    """Insert a `pose (7,)` among the first `count` of `times (N,)` and `poses (N, 7)`, unless one is at nearly the same
+    instant; if there is no room, the older half is forgotten first.
+
+    Returns how many there are then, and whether the pose is one of them. Neighbouring quaternions are kept in one
+    hemisphere, because trackers may flip their signs.
+    """
+    at = count
+    if count > 0 and t_s - times[count - 1] < MIN_SPACING_S:
+        at = _count_before(times[:count], t_s)
+        for near in range(max(at - 1, 0), min(at + 1, count)):
+            if abs(times[near] - t_s) < MIN_SPACING_S:
+                return count, False
+    if count == len(times):
+        count -= KEEP
+        at -= KEEP
+        for i in range(count):
+            _move(times, poses, i + KEEP, i)
+        if at < 0:
+            return count, False
+    for i in range(count, at, -1):
+        _move(times, poses, i - 1, i)
+    times[at] = t_s
+    for k in range(7):
+        poses[at, k] = pose[k]
+    count += 1
+    for i in range(max(at, 1), count):
+        cosine = 0.0
+        for k in range(3, 7):
+            cosine += poses[i, k] * poses[i - 1, k]
+        if cosine < 0.0:
+            for k in range(3, 7):
+                poses[i, k] = -poses[i, k]
+        elif i > at:
+            break
+    return count, True
+
+
+@inner
+def _move(times: Array, poses: Array, start: int, end: int):
+    times[end] = times[start]
+    for k in range(7):
+        poses[end, k] = poses[start, k]
 
 
 @kernel

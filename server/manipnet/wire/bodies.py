@@ -66,6 +66,12 @@ class BodyFrame(NamedTuple):
     timecode_rate: float | None = None
     """The timecode's frames per second, if the sender gives it."""
 
+    def by_key(self) -> "dict[int | str, BodySample]":
+        """The bodies by their ids and by their names."""
+        ids = {body.id: body for body in self.bodies if body.id is not None}
+        names = {body.name: body for body in self.bodies if body.name is not None}
+        return {**ids, **names}
+
 
 def parse_bodies(payload: bytes, t_received_s: float, source: str) -> BodyFrame:
     """Read a msgpack map or a JSON object, as `docs/protocol-in.md` describes them. Raises only `MessageError`."""

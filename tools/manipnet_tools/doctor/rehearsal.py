@@ -1,7 +1,7 @@
 """Receives frames as a server's actors do, without hands: so the doctor sees the same drops and states."""
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,7 +14,7 @@ from manipnet.runtime.status import bodies_report
 from manipnet.runtime.tick_errors import TickErrors
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.timeline import Timeline
-from manipnet.wire.bodies import BodyFrame
+from manipnet.wire.bodies import BodyFrame, BodySample
 
 POLL_S = 0.02
 
@@ -47,8 +47,8 @@ class _Actor:
         self.config = config
         self._roles, self._timeline = BodyRoles(config), Timeline()
 
-    def push(self, frame: BodyFrame) -> str | None:
-        poses = self._roles.poses(frame)
+    def push(self, frame: BodyFrame, bodies: Mapping[BodyKey, BodySample]) -> str | None:
+        poses = self._roles.poses(bodies)
         if not poses:
             return "unknown_body"
         return self._timeline.push(frame.t_s, poses, frame.t_received_s, frame.source)
