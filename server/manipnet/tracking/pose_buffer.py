@@ -49,6 +49,8 @@ class PoseBuffer:
         self._count = 0
         self.seen_s = -np.inf
         """Newest instant at which the body was in a frame, tracked or not."""
+        self.newest_s = -np.inf
+        """Instant of the newest tracked sample."""
         self.noise = UNKNOWN
         """The noise of the newest samples."""
         self._estimated_s = -np.inf
@@ -66,6 +68,8 @@ class PoseBuffer:
     def add(self, t_s: float, pose: Array | Sequence[float]) -> bool:
         """Insert a tracked pose; returns False, and changes nothing, if there is one at nearly the same instant."""
         self._count, added = _insert(self._times, self._poses, self._count, t_s, np.asarray(pose, np.float64))
+        if added:
+            self.newest_s = max(self.newest_s, t_s)
         if added and t_s - self._estimated_s >= NOISE_EVERY_S:
             self._estimated_s, self.noise = t_s, estimate_noise(self.times, self.poses)
         return added
@@ -82,7 +86,15 @@ class PoseBuffer:
 
     def noise_at(self, t_s: float) -> Noise:
         """The noise of the newest samples, which is unknown if the body has been lost for long at `t_s`."""
-        return self.noise if self._count and t_s - self._times[self._count - 1] < FORGET_S else UNKNOWN
+        return self.noise if t_s - self.newest_s < FORGET_S else UNKNOWN
+
+    def resample(self, times_s: Array, present_s: float, until_s: float, out: Array) -> tuple[int, float, float]:
+        """Interpolate the poses at rising `times_s (n,)` into `out (n, 7)`.
+
+        Returns how many samples may be used, which are those up to the first one at or after `until_s`, the instant of
+        the last of them, and the age at `present_s` of the newest one before it, which is infinite if there is none.
+        """
+        return _resample(self._times, self._poses, self._count, times_s, present_s, until_s, out)
 
 
 def sample(
@@ -100,30 +112,35 @@ def sample(
     motion, or the last pose stands if there is no `forecast`. With `smoothing`, poses and forecast are those of the
     smoothed motion.
     """
-    poses, ages = np.empty((len(tracks), len(times_s), 7)), []
+    poses, ages, end_s = np.empty((len(tracks), len(times_s), 7)), [], float(times_s[-1])
     for row, track in zip(poses, tracks, strict=True):
-        known, age_s = _resample(track.times, track.poses, times_s, present_s, until_s, row)
+        known, last_s, age_s = track.resample(times_s, present_s, until_s, row)
         ages.append(age_s)
-        samples = track.times[:known], track.poses[:known]
         if smoothing is not None:
-            smooth(*samples, smoothing, times_s, row)
-        if forecast is None or times_s[-1] <= (last_s := track.times[known - 1] + TIME_TOLERANCE_S):
-            continue
-        beyond = int(np.searchsorted(times_s, last_s, side="right"))
-        if smoothing is None:
-            row[beyond:] = forecast(*samples, times_s[beyond:])
-        else:
-            fit_s = FIT_S + smoothing.share * (smoothing.half_width_s - FIT_S)
-            history = _smoothed_history(*samples, smoothing, fit_s)
-            row[beyond:] = forecast(*history, times_s[beyond:], fit_s, smoothing.share)
+            smooth(track.times[:known], track.poses[:known], smoothing, times_s, row)
+        if forecast is not None and end_s > last_s + TIME_TOLERANCE_S:
+            _continue(track.times[:known], track.poses[:known], forecast, smoothing, times_s, row)
     return poses, ages
+
+
+def _continue(
+    known_s: Array, poses: Array, forecast: Forecast, smoothing: Smoothing | None, times_s: Array, row: Array
+) -> None:
+    """Replace the poses `row (n, 7)` at the `times_s (n,)` that are after the last known sample by a forecast."""
+    beyond = int(np.searchsorted(times_s, known_s[-1] + TIME_TOLERANCE_S, side="right"))
+    if smoothing is None:
+        row[beyond:] = forecast(known_s, poses, times_s[beyond:])
+    else:
+        fit_s = FIT_S + smoothing.share * (smoothing.half_width_s - FIT_S)
+        history = _smoothed_history(known_s, poses, smoothing, fit_s)
+        row[beyond:] = forecast(*history, times_s[beyond:], fit_s, smoothing.share)
 
 
 def _smoothed_history(times_s: Array, poses: Array, smoothing: Smoothing, length_s: float) -> tuple[Array, Array]:
     """The newest moments of a motion as evenly spaced samples: their times `(n,)` and poses `(n, 7)`."""
     at_s = times_s[-1] + length_s * HISTORY_STEPS
     smoothed = np.empty((len(at_s), 7))
-    _resample(times_s, poses, at_s, at_s[-1], at_s[-1], smoothed)
+    _resample(times_s, poses, len(times_s), at_s, at_s[-1], at_s[-1], smoothed)
     smooth(times_s, poses, smoothing, at_s, smoothed)
     return at_s, smoothed
 
@@ -188,12 +205,9 @@ def _move(times: Array, poses: Array, start: int, end: int):
 
 
 @kernel
-def _resample(times: Array, poses: Array, at: Array, present_s: float, until_s: float, out: Array):
-    """Write the poses at the rising instants `at`, interpolated between the rising `times`, into `out`.
-
-    The poses stand at both ends. Returns the number of samples up to the first one at or after `until_s`, which are
-    those that may be used, and the age of the newest sample at `present_s`, which is infinite if there is none.
-    """
+def _resample(times: Array, poses: Array, count: int, at: Array, present_s: float, until_s: float, out: Array):
+    """`PoseBuffer.resample` of the first `count` samples. The poses stand at both ends."""
+    times = times[:count]
     known = min(_count_before(times, until_s - TIME_TOLERANCE_S) + 1, len(times))
     before = _count_before(times, present_s + TIME_TOLERANCE_S)
     age_s = max(present_s - times[before - 1], 0.0) if before > 0 else np.inf
@@ -210,4 +224,4 @@ def _resample(times: Array, poses: Array, at: Array, present_s: float, until_s: 
         for k in range(3):
             out[i, k] = poses[before, k] + fraction * (poses[after, k] - poses[before, k])
         slerp_into(poses[before, 3:], poses[after, 3:], fraction, out[i, 3:])
-    return known, age_s
+    return known, times[known - 1], age_s

@@ -1,5 +1,6 @@
 """The tick: one instant of stream time, and the tracked bodies as they are seen from it."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -74,11 +75,11 @@ def bodies_at(
 
     Without a `forecast` the last pose of a body stands for its future.
     """
-    tracked = {name: track for name, track in tracks.items() if len(track.times)}
+    tracked = {name: track for name, track in tracks.items() if track.newest_s > -math.inf}
     if not tracked:
         return {}
     windows, ages = sample(list(tracked.values()), time_s + WINDOW_OFFSETS_S, time_s, until_s, forecast, smoothing)
     return {
-        name: BodyAtTick(window, window[PRESENT], age_s, bool(time_s <= track.times[-1] + TIME_TOLERANCE_S))
+        name: BodyAtTick(window, window[PRESENT], age_s, time_s <= track.newest_s + TIME_TOLERANCE_S)
         for (name, track), window, age_s in zip(tracked.items(), windows, ages, strict=True)
     }
