@@ -12,7 +12,8 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from hdrh.histogram import HdrHistogram
+
+from manipnet.common.durations import Durations
 
 DROP_REASONS = (
     "duplicate",  # the same instant twice
@@ -198,16 +199,14 @@ class Timings:
 
     def __init__(self, window: int = 960) -> None:
         self._lock = threading.Lock()
-        self._all = {stage: HdrHistogram(1, 60_000_000, 3) for stage in STAGES}
-        self._sums_s: dict[str, float] = dict.fromkeys(STAGES, 0.0)
+        self._all = {stage: Durations() for stage in STAGES}
         self._recent = {stage: deque[float](maxlen=window) for stage in STAGES}
 
     def record(self, stage: str, seconds: float) -> None:
-        """Add one duration, with a resolution of 1 µs and at most 60 s."""
+        """Add one duration."""
         with self._lock:
-            self._all[stage].record_value(min(max(int(seconds * 1e6), 1), 60_000_000))
+            self._all[stage].add(seconds)
             self._recent[stage].append(seconds)
-            self._sums_s[stage] += seconds
 
     def recent(self, stage: str, *percentiles: float) -> list[float]:
         """Percentiles, in seconds, of the durations since the last call, or zeros if there are none."""
@@ -219,12 +218,12 @@ class Timings:
     def overall(self, stage: str, *percentiles: float) -> list[float]:
         """Percentiles, in seconds, of all durations since the start."""
         with self._lock:
-            return [self._all[stage].get_value_at_percentile(p) * 1e-6 for p in percentiles]
+            return [self._all[stage].percentile(p) for p in percentiles]
 
     def totals(self, stage: str) -> tuple[int, float]:
         """The number of durations since the start, and their sum in seconds."""
         with self._lock:
-            return int(self._all[stage].get_total_count()), self._sums_s[stage]
+            return self._all[stage].count, self._all[stage].sum_s
 
 
 class StageClock:
