@@ -43,12 +43,15 @@ def _is_sound(message: HandsMessage, numbers: Array) -> bool:
 
     False as well where only `_check_numbers` can tell.
     """
-    hands = message.hands.values()
-    if not message.hands.keys() <= _SIDES or any(hand.state not in STATES or not hand.scale > 0.0 for hand in hands):
+    for side, hand in message.hands.items():
+        if side not in _SIDES or hand.state not in STATES or not hand.scale > 0.0:
+            return False
+    # Sums of squares are bounds of each square; NaN is not below any bound.
+    if not numbers @ numbers <= MAX_NUMBER**2:
         return False
     quats = quaternions(message, numbers)
-    lengths = np.einsum("ij,ij->i", quats, quats)
-    return bool((np.abs(numbers) <= MAX_NUMBER).all() and (np.abs(lengths - 1.0) <= UNIT_TOLERANCE).all())
+    excess = np.einsum("ij,ij->i", quats, quats) - 1.0
+    return bool(excess @ excess <= UNIT_TOLERANCE**2)
 
 
 def _check_numbers(message: HandsMessage) -> None:
