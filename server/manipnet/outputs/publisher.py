@@ -37,10 +37,14 @@ class Publisher:
 
         `close` closes the outputs.
         """
-        self._outputs, self._telemetry = dict(outputs), telemetry
+        self._outputs = dict(outputs)
         self._tape, self._taped = tape, frozenset(taped)
         for declared in outputs:
             telemetry.declare("messages_out", *declared.labels)
+        self._counters = {
+            declared.name: [telemetry.counter("messages_out", topic=topic) for topic in declared.labels]
+            for declared in outputs
+        }
 
     @property
     def addresses(self) -> dict[str, str]:
@@ -60,8 +64,8 @@ class Publisher:
         for declared, output in self._outputs.items():
             try:
                 if output.send(hands):
-                    for topic in declared.labels:
-                        self._telemetry.count("messages_out", topic=topic)
+                    for count in self._counters[declared.name]:
+                        count()
             except OSError as error:
                 _log.warning("%s: hands cannot be sent: %s", declared.name, error)
 
@@ -78,8 +82,8 @@ class Publisher:
         for declared, output in self._outputs.items():
             try:
                 if output.send_avatar(hands, profile):
-                    for topic in declared.labels:
-                        self._telemetry.count("messages_out", topic=topic)
+                    for count in self._counters[declared.name]:
+                        count()
             except OSError as error:
                 _log.warning("%s: an avatar's hands cannot be sent: %s", declared.name, error)
 

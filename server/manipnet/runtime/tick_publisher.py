@@ -9,7 +9,7 @@ from manipnet.actors.transitions import ShownHand
 from manipnet.runtime.tick_errors import TickErrors
 from manipnet.telemetry import Telemetry
 from manipnet.tracking.tick import Tick
-from manipnet.wire import HandsMessage, Latency, Side
+from manipnet.wire import STATES, HandsMessage, Latency, Side
 
 
 class TickPublisher:
@@ -19,12 +19,13 @@ class TickPublisher:
         self, session: str, publish: Callable[[HandsMessage], object], errors: TickErrors, telemetry: Telemetry
     ) -> None:
         self._session, self._publish, self._errors, self._telemetry = session, publish, errors, telemetry
+        self._count_hand = {state: telemetry.counter("hand_ticks", state=state) for state in STATES}
         self._published_s: dict[str, float] = {}
 
     def send(self, actor: Actor, tick: Tick, hands: Mapping[Side, ShownHand]) -> HandsMessage | None:
         """Publish the hands of an actor; returns the message, or None if it could not be made."""
         for hand in hands.values():
-            self._telemetry.count("hand_ticks", state=hand.state)
+            self._count_hand[hand.state]()
         now_s = time.monotonic()
         message = None
         try:

@@ -40,6 +40,8 @@ MAX_BODIES: Final = 1_024
 FAULTS: Final = ("jump", "swap", "zeros", "frozen")
 """Why a body is rejected; kernels count them from 1, and 0 is no fault."""
 _JUMP, _SWAP, _ZEROS, _FROZEN = 1, 2, 3, 4
+_FAULT: Final = 7
+"""The column of a sample after its pose."""
 
 Key = tuple[int | None, str | None]
 """Id and name of a body."""
@@ -85,13 +87,13 @@ class OutlierGate:
         if not bodies:
             return frame, []
         rows = self._rows_of(frame.source, [*map(_key, bodies)])
-        poses = np.array([body.p + body.q for body in bodies], np.float64)
-        faults = np.array([not body.tracked for body in bodies], np.int8)
+        samples = np.array([(*body.p, *body.q, not body.tracked) for body in bodies], np.float64)
         moved_s = self._moved_s.get(frame.source, frame.t_s)
-        if _judge(self._histories, rows, poses, frame.t_s, moved_s, faults):
+        changed, faulty = _judge(self._histories, rows, samples, frame.t_s, moved_s)
+        if changed:
             self._moved_s[frame.source] = frame.t_s
-        if faults.any():
-            bodies = tuple(map(_with_fault, bodies, faults.tolist()))
+        if faulty:
+            bodies = tuple(map(_with_fault, bodies, samples[:, _FAULT].astype(int).tolist()))
             frame = frame._replace(bodies=bodies)
         return frame, [body.fault for body in bodies if body.fault is not None]
 
@@ -126,20 +128,21 @@ def _with_fault(body: BodySample, fault: int) -> BodySample:
 
 
 @kernel
-def _judge(histories: np.ndarray, rows: np.ndarray, poses: Array, t_s: float, moved_s: float, faults: np.ndarray):
-    """Judge the bodies `poses (n, 7)` of one frame by their histories, and update those.
+def _judge(histories: np.ndarray, rows: np.ndarray, samples: Array, t_s: float, moved_s: float):
+    """Judge the bodies of one frame by their histories, and update those.
 
-    `faults (n,)` are not zero for bodies that are not tracked, which are left out; the faults of others are written
-    into it. `moved_s` is when a body of the sender changed last. Returns whether one has changed now.
+    `samples (n, 8)` are their poses, and then a number that is not zero for a body that is not tracked; the faults of
+    the others are written there. `moved_s` is when a body of the sender changed last. Returns whether one has changed
+    now, and whether one has a fault.
     """
-    _find_swaps(histories, rows, poses, t_s, faults)
-    changed = False
+    _find_swaps(histories, rows, samples, t_s)
+    changed = faulty = False
     for i in range(len(rows)):
-        history, pose = histories[rows[i]], poses[i]
-        if faults[i] > 0:
+        history, pose = histories[rows[i]], samples[i]
+        if pose[_FAULT] > 0.0:
             continue
-        swapped = faults[i] < 0
-        faults[i] = 0
+        swapped = pose[_FAULT] < 0.0
+        pose[_FAULT] = 0.0
         if history.is_known == 0:
             history.is_known = 1
             history.changed_s = t_s
@@ -147,23 +150,24 @@ def _judge(histories: np.ndarray, rows: np.ndarray, poses: Array, t_s: float, mo
             continue
         # If nothing moves, a recording has ended or is paused, and no single body is frozen.
         others_move = (0.0 if changed else t_s - moved_s) < MOVING_S
-        faults[i] = _fault(history, t_s, pose, swapped, others_move)
+        pose[_FAULT] = _fault(history, t_s, pose, swapped, others_move)
         changed = changed or history.changed_s == t_s
-    return changed
+        faulty = faulty or pose[_FAULT] > 0.0
+    return changed, faulty
 
 
 @inner
-def _find_swaps(histories: np.ndarray, rows: np.ndarray, poses: Array, t_s: float, faults: np.ndarray):
+def _find_swaps(histories: np.ndarray, rows: np.ndarray, samples: Array, t_s: float):
     """Make the faults of bodies -1 that exchanged their places in one step, as they do when a tracker confuses two."""
     for i in range(len(rows)):
-        if faults[i] > 0 or not _is_fast(histories[rows[i]], poses[i], t_s):
+        if samples[i, _FAULT] > 0.0 or not _is_fast(histories[rows[i]], samples[i], t_s):
             continue
         for j in range(i):
-            if faults[j] > 0 or not _is_fast(histories[rows[j]], poses[j], t_s):
+            if samples[j, _FAULT] > 0.0 or not _is_fast(histories[rows[j]], samples[j], t_s):
                 continue
             one, other = histories[rows[i]].pose, histories[rows[j]].pose
-            if max(_dist(poses[i], other), _dist(poses[j], one)) < SWAP_RATIO * _dist(one, other):
-                faults[i] = faults[j] = -1
+            if max(_dist(samples[i], other), _dist(samples[j], one)) < SWAP_RATIO * _dist(one, other):
+                samples[i, _FAULT] = samples[j, _FAULT] = -1.0
 
 
 @inner

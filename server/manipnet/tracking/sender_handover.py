@@ -17,14 +17,25 @@ class SenderHandover:
 
     def may_send(self, name: str, source: str, now_s: float) -> bool:
         """Whether `source` moves a body, or may take it over."""
-        owner, heard_s = self._owners.get(name, (source, now_s))
-        return owner == source or now_s - heard_s >= OTHER_SENDER_S
+        return not self.refused((name,), source, now_s)
+
+    def refused(self, names: Iterable[str], source: str, now_s: float) -> list[str]:
+        """Those of the names that `source` may not move."""
+        return [
+            name
+            for name in names
+            if (owned := self._owners.get(name)) is not None
+            and owned[0] != source
+            and now_s - owned[1] < OTHER_SENDER_S
+        ]
 
     def note(self, names: Iterable[str], source: str, now_s: float) -> None:
-        """Note that `source` sent these bodies; it also keeps or takes the clock if it may."""
-        for name in (CLOCK, *names):
-            if self.may_send(name, source, now_s):
-                self._owners[name] = (source, now_s)
+        """Note that `source` sent these bodies, which it may; it also keeps or takes the clock if it may."""
+        heard = source, now_s
+        if self.may_send(CLOCK, source, now_s):
+            self._owners[CLOCK] = heard
+        for name in names:
+            self._owners[name] = heard
 
     def clock_owner(self) -> str | None:
         """The sender whose clock is the stream's; None before the first frame."""

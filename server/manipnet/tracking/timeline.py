@@ -92,7 +92,8 @@ class Timeline:
 
         The reasons are of `telemetry.DROP_REASONS`: other_sender, late, time_jump, duplicate.
         """
-        poses = {name: pose for name, pose in poses.items() if self._senders.may_send(name, source, now_s)}
+        if refused := self._senders.refused(poses, source, now_s):
+            poses = {name: pose for name, pose in poses.items() if name not in refused}
         if not poses:
             return "other_sender"
         run = self._run or self._begin(t_s, now_s)

@@ -1,5 +1,6 @@
 """Publishes hands on a bound PUB socket, in both encodings; `docs/protocol.md` describes the messages."""
 
+import math
 import time
 
 import zmq
@@ -17,6 +18,8 @@ MAX_SUBSCRIPTION_BYTES = 1024
 """Subscriptions, and the handshake of CURVE, are all that clients send."""
 READ_AT_ONCE = 256
 """Subscriptions that are read at one call."""
+READ_EVERY_S = 0.04
+"""How often they are read: asking the socket costs a tenth of encoding and sending a message."""
 
 
 class ZmqPublisher(HandsOutput):
@@ -29,7 +32,7 @@ class ZmqPublisher(HandsOutput):
         self.address = self._bound.address
         self._health, self._pauses = ReceiverHealth("hands", telemetry), Pauses()
         self._pauses.opened()
-        self._subscriptions = Subscriptions()
+        self._subscriptions, self._read_s = Subscriptions(), -math.inf
         self._retry_s: float | None = None
         """When the socket, which has failed, is opened again."""
 
@@ -73,10 +76,11 @@ class ZmqPublisher(HandsOutput):
         return False
 
     def _read_subscriptions(self) -> None:
-        """Note what clients have subscribed to since the last call, and whether any is connected."""
-        if self._retry_s is not None:
-            return
+        """Note what clients have subscribed to, and whether any is connected, if that was not done just now."""
         now_s = time.monotonic()
+        if self._retry_s is not None or now_s - self._read_s < READ_EVERY_S:
+            return
+        self._read_s = now_s
         self._subscriptions.count(self._bound.connected(), now_s)
         try:
             for _ in range(READ_AT_ONCE):
