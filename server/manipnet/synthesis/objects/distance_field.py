@@ -101,10 +101,16 @@ def field_distance(field: Field, px: float, py: float, pz: float):
     x = min(max((px - field.origin[0]) * per_m, 0.0), nx - 1.000001)
     y = min(max((py - field.origin[1]) * per_m, 0.0), ny - 1.000001)
     z = min(max((pz - field.origin[2]) * per_m, 0.0), nz - 1.000001)
-    i, j, k = int(x), int(y), int(z)
+    # numbers without a sign: an index that may be negative is tested at every access
+    i, j, k, one = np.uint64(x), np.uint64(y), np.uint64(z), np.uint64(1)
     u, v, w = x - i, y - j, z - k
-    d000, d001, d010, d011 = d[i, j, k], d[i, j, k + 1], d[i, j + 1, k], d[i, j + 1, k + 1]
-    d100, d101, d110, d111 = d[i + 1, j, k], d[i + 1, j, k + 1], d[i + 1, j + 1, k], d[i + 1, j + 1, k + 1]
+    d000, d001, d010, d011 = d[i, j, k], d[i, j, k + one], d[i, j + one, k], d[i, j + one, k + one]
+    d100, d101, d110, d111 = (
+        d[i + one, j, k],
+        d[i + one, j, k + one],
+        d[i + one, j + one, k],
+        d[i + one, j + one, k + one],
+    )
     d00, d01 = d000 + u * (d100 - d000), d001 + u * (d101 - d001)
     d10, d11 = d010 + u * (d110 - d010), d011 + u * (d111 - d011)
     d0, d1 = d00 + v * (d10 - d00), d01 + v * (d11 - d01)
