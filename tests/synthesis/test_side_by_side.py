@@ -11,7 +11,7 @@ from written_scene import scenes_at
 from manipnet.synthesis import synthesizer
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.shape import load_shape
-from manipnet.synthesis.side_by_side import LEAST_HANDS, MOST_PARTS, SideBySide, part_count
+from manipnet.synthesis.side_by_side import LEAST_HANDS, MOST_PARTS, SideBySide, cuts, part_count
 from manipnet.synthesis.synthesizer import HandStep, Synthesizer
 
 
@@ -33,6 +33,13 @@ def test_hands_do_not_depend_on_the_number_of_parts(tiny_bundle: Path, monkeypat
             np.testing.assert_array_equal(one.angles, other.angles)
             np.testing.assert_array_equal(one.positions, other.positions)
             np.testing.assert_array_equal(one.state.grip, other.state.grip)
+
+
+def test_hands_that_hold_the_same_are_not_cut_apart() -> None:
+    assert cuts("aabbcc", 2) == [0, 4, 6]
+    assert cuts("aabbcc", 3) == [0, 2, 4, 6]
+    assert cuts("abcdefgh", 4) == [0, 2, 4, 6, 8]
+    assert cuts("aaaaaaaa", 4) == [0, 8, 8, 8, 8]
 
 
 def test_small_batches_are_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,7 @@
 """Runs parts of a batch on several cores: compiled kernels and the ray tracer need no interpreter's lock."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Final
 
@@ -15,6 +15,20 @@ def part_count(hands: int) -> int:
     affinity = getattr(os, "sched_getaffinity", None)
     cores = len(affinity(0)) if affinity else os.cpu_count() or 1
     return max(min(hands // LEAST_HANDS, cores, MOST_PARTS), 1)
+
+
+def cuts(held: Sequence[Hashable], parts: int) -> list[int]:
+    """Where a batch is cut into parts of about the same size: the beginning of each, and the end.
+
+    Neighbours that hold the same are not cut apart, because what one of them does depends on the other.
+    """
+    places = [0]
+    for part in range(1, parts):
+        place = max(len(held) * part // parts, places[-1])
+        while 0 < place < len(held) and held[place] == held[place - 1]:
+            place += 1
+        places.append(place)
+    return [*places, len(held)]
 
 
 class SideBySide:

@@ -29,7 +29,7 @@ from manipnet.synthesis.model.bundle import Bundle
 from manipnet.synthesis.model.features import Windows, rays_of, sense
 from manipnet.synthesis.model.layout import PRESENT, WINDOW
 from manipnet.synthesis.objects.shape import Shape
-from manipnet.synthesis.side_by_side import SideBySide, part_count
+from manipnet.synthesis.side_by_side import SideBySide, cuts, part_count
 
 ABSENT_HAND_M = 0.45
 """Distance at which a hand that is not tracked is assumed to be."""
@@ -170,11 +170,12 @@ class Synthesizer:
         if count not in self._batches:
             self._batches[count] = _Batch(bundle, count)
         batch, poses = self._batches[count], allocate_poses(hand, count)
-        order = sorted(range(count), key=lambda index: id(scenes[index].shape))
+        first_at: dict[int, int] = {}
+        order = sorted(range(count), key=lambda index: first_at.setdefault(id(scenes[index].shape), index))
         for n, index in enumerate(order):
             batch.put(n, scenes[index], states[index])
             poses.correction[n], poses.grip[n] = states[index].correction, states[index].grip
-        parts = _parts([scenes[index].shape for index in order], len(batch.rays))
+        parts = _parts([scenes[index] for index in order], len(batch.rays))
 
         def sense_part(part: int) -> None:
             for shape, first, last in parts[part]:
@@ -216,10 +217,13 @@ _Group = tuple[Shape, int, int]
 """Neighbouring hands about the same shape: the shape, the first hand, one past the last."""
 
 
-def _parts(shapes: Sequence[Shape], count: int) -> list[list[_Group]]:
-    """The hands about these shapes in `count` parts of about the same size, each in groups."""
-    cuts = [len(shapes) * part // count for part in range(count + 1)]
-    return [_groups(shapes, begin, end) for begin, end in pairwise(cuts)]
+def _parts(scenes: Sequence[HandScene], count: int) -> list[list[_Group]]:
+    """The hands in these scenes in `count` parts of about the same size, each in groups."""
+    shapes = [scene.shape for scene in scenes]
+    if count == 1:
+        return [_groups(shapes, 0, len(shapes))]
+    held = [(id(scene.shape), scene.object[PRESENT].tobytes()) for scene in scenes]
+    return [_groups(shapes, begin, end) for begin, end in pairwise(cuts(held, count))]
 
 
 def _groups(shapes: Sequence[Shape], begin: int, end: int) -> list[_Group]:
