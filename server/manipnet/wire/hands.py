@@ -6,7 +6,7 @@ Right-handed, Y up, metres, seconds, radians, quaternions xyzw.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Annotated, Final, Literal, get_args, get_type_hints
 
 import numpy as np
@@ -103,6 +103,13 @@ class HandsMessage:
     """The timecode's frames per second, if it is known."""
     hand: str | None = None
     """The name of the hand profile that the hands are of; None for the model's hand."""
+    numbers: Array | None = field(default=None, init=False)
+    """All its numbers (`wire.numbers`), if whoever made it knows that they are sound. A changed copy has none."""
+
+    def with_sound(self, numbers: Array) -> "HandsMessage":
+        """The same message, with its numbers, which are known to be sound."""
+        object.__setattr__(self, "numbers", numbers)
+        return self
 
 
 Record = list[tuple[str, np.dtype]]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import fields
 from functools import lru_cache
 from math import prod
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,39 @@ HAND_SHAPES: Final = tuple((name, dtype.shape) for name, dtype in RECORDS[HandPo
 _SIZES = tuple(prod(shape) for _, shape in HAND_SHAPES)
 _STARTS = {name: 1 + sum(_SIZES[:place]) for place, (name, _) in enumerate(HAND_SHAPES)}
 HAND_NUMBERS: Final = 1 + sum(_SIZES)
+HAND_COLUMNS: Final = tuple(_STARTS.values())
+"""Where each of these arrays begins among the numbers of a hand."""
 LATENCIES: Final = tuple(field.name for field in fields(Latency))
+
+
+def allocate_numbers(hands: int, bodies: int) -> Array:
+    """Memory for the numbers of a message of the model's hands."""
+    return np.empty(TIMES + hands * HAND_NUMBERS + bodies * POSE_SHAPE[0] + len(LATENCIES))
+
+
+def hand_rows(numbers: Array, hands: int) -> Array:
+    """The part of those numbers that is about the hands, `(hands, HAND_NUMBERS)`."""
+    return numbers[TIMES : TIMES + hands * HAND_NUMBERS].reshape(hands, HAND_NUMBERS)
+
+
+class HandArrays(NamedTuple):
+    """The arrays of `HandPose` of any number of hands."""
+
+    angles: Array
+    rotations: Array
+    wrist: Array
+    joints: Array
+
+
+def hand_arrays(rows: Array) -> HandArrays:
+    """The arrays of hands in their numbers `(N, HAND_NUMBERS)`, without a copy."""
+    return HandArrays(*[rows[:, columns].reshape(shape) for columns, shape in _PARTS])
+
+
+_PARTS: Final = tuple(
+    (slice(start, start + size), (-1, *shape))
+    for (_, shape), start, size in zip(HAND_SHAPES, HAND_COLUMNS, _SIZES, strict=True)
+)
 
 
 def numbers_of(message: HandsMessage) -> Array | None:
@@ -58,9 +90,9 @@ def hand_starts(message: HandsMessage) -> Iterator[int]:
     yield start
 
 
-def quaternions(message: HandsMessage, numbers: Array) -> Array:
-    """All quaternions `(n, 4)` of a message, from its numbers."""
-    return numbers[_quaternion_places(tuple(hand_starts(message)), len(message.bodies))]
+def quaternion_places(message: HandsMessage) -> np.ndarray:
+    """Where the quaternions of a message are among its numbers, `(n, 4)`."""
+    return _quaternion_places(tuple(hand_starts(message)), len(message.bodies))
 
 
 @lru_cache(64)

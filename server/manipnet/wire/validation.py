@@ -8,7 +8,7 @@ import numpy as np
 from manipnet.geometry import SIDES, Array, Side
 from manipnet.wire.bodies import MAX_BODIES, MessageError
 from manipnet.wire.hands import STATES, VERSION, HandPose, HandsMessage, Latency
-from manipnet.wire.numbers import HAND_SHAPES, POSE_SHAPE, SHIFT_SHAPE, numbers_of, quaternions
+from manipnet.wire.numbers import HAND_SHAPES, POSE_SHAPE, SHIFT_SHAPE, numbers_of, quaternion_places
 from manipnet.wire.timecode import MAX_RATE, is_rate, is_timecode
 
 MAX_NUMBER: Final = 1e12
@@ -31,25 +31,30 @@ def check(message: HandsMessage) -> Array:
         raise MessageError(f"timecode is {message.timecode!r:.40}; it must be HH:MM:SS:FF or HH:MM:SS;FF")
     if message.timecode_rate is not None and not is_rate(message.timecode_rate):
         raise MessageError(f"timecode_rate is {message.timecode_rate}; it must be above 0 and at most {MAX_RATE:g}")
-    numbers = numbers_of(message)
-    if numbers is None or not _is_sound(message, numbers):
-        _check_numbers(message)
+    numbers = message.numbers
+    has_known_words = _has_known_words(message)
+    if numbers is None or not has_known_words:
+        numbers = numbers_of(message)
+        if numbers is None or not has_known_words or not _are_sound(message, numbers):
+            _check_numbers(message)
     assert numbers is not None  # a wrong shape has raised
     return numbers
 
 
-def _is_sound(message: HandsMessage, numbers: Array) -> bool:
+def _has_known_words(message: HandsMessage) -> bool:
+    """Whether sides and states are known, and hands have a size."""
+    return all(side in _SIDES and hand.state in STATES and hand.scale > 0.0 for side, hand in message.hands.items())
+
+
+def _are_sound(message: HandsMessage, numbers: Array) -> bool:
     """Whether all numbers and quaternions are in order; they are checked together, in a fraction of the time.
 
     False as well where only `_check_numbers` can tell.
     """
-    for side, hand in message.hands.items():
-        if side not in _SIDES or hand.state not in STATES or not hand.scale > 0.0:
-            return False
     # Sums of squares are bounds of each square; NaN is not below any bound.
     if not numbers @ numbers <= MAX_NUMBER**2:
         return False
-    quats = quaternions(message, numbers)
+    quats = numbers[quaternion_places(message)]
     excess = np.einsum("ij,ij->i", quats, quats) - 1.0
     return bool(excess @ excess <= UNIT_TOLERANCE**2)
 

@@ -18,6 +18,7 @@ from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Hand, Indices
 from manipnet.synthesis.hand.kinematics import forward_kinematics, forward_kinematics_into
 from manipnet.synthesis.hand.packed import unpack_skeleton
 from manipnet.synthesis.rotations import matrix_to_quat_into, multiply_quats_into, quat_rotate_into
+from manipnet.wire.numbers import HAND_COLUMNS, HAND_NUMBERS, hand_arrays
 
 METACARPAL_BASE: Final = 0.3
 """Where a finger's metacarpal begins on the way from the wrist to its knuckle; the palm of our hand is one bone."""
@@ -50,41 +51,42 @@ def pose_in_world(
     them. Finger metacarpals, which our hand lacks, and the palm turn with the wrist; the palm lies in the middle of the
     middle metacarpal.
     """
+    rows = np.empty((len(sides), HAND_NUMBERS))
+    given = hand_arrays(rows)
+    rows[:, 0], given.angles[:], given.wrist[:] = scale, angles, T_world_wrist
+    place_in_world(hand, sides, rows)
+    return np.ascontiguousarray(given.rotations), np.ascontiguousarray(given.joints)
+
+
+def place_in_world(hand: Hand, sides: Sequence[Side], rows: Array) -> None:
+    """Complete what messages say of hands, `rows (N, HAND_NUMBERS)` of which the sizes, angles and wrists are given, by
+    rotations and joints as `pose_in_world` has them."""
     left = np.array([side == "left" for side in sides])
-    frames = openxr_frames(hand)
-    local, joints = np.empty((len(left), hand.bone_count, 4)), np.empty((len(left), len(frames.joints), 7))
-    _pose_in_world(hand.packed, frames, angles, T_world_wrist, left, scale, local, joints)
-    return local, joints
+    _place_in_world(hand.packed, openxr_frames(hand), left, HAND_COLUMNS, rows)
 
 
 @kernel
-def _pose_in_world(
-    hand: np.ndarray,
-    frames: OpenXrFrames,
-    angles: Array,
-    wrists: Array,
-    left: np.ndarray,
-    scale: float,
-    local: Array,
-    joints: Array,
-):
+def _place_in_world(hand: np.ndarray, frames: OpenXrFrames, left: np.ndarray, columns: tuple[int, ...], rows: Array):
     skeleton, positions, rotations, axes = unpack_skeleton(hand), _positions(), _rotations(), _axes()
     quats, turned, point = _quats(), _quat(), vector()
-    for n in range(len(angles)):
-        forward_kinematics_into(skeleton, angles[n], positions, rotations, axes)
+    angles_at, rotations_at, wrist_at, joints_at = columns
+    for n in range(len(rows)):
+        row, scale, wrist = rows[n], rows[n, 0], rows[n, wrist_at : wrist_at + 7]
+        forward_kinematics_into(skeleton, row[angles_at:rotations_at], positions, rotations, axes)
         for bone in range(len(skeleton.rest)):
             matrix_to_quat_into(rotations[bone], left[n], quats[bone])
-            multiply_quats_into(quats[max(skeleton.parents[bone], 0)], -1.0, quats[bone], local[n, bone])
-        wrist, own = wrists[n], joints[n]
+            local = row[rotations_at + 4 * bone : rotations_at + 4 * bone + 4]
+            multiply_quats_into(quats[max(skeleton.parents[bone], 0)], -1.0, quats[bone], local)
         for i in range(len(frames.joints)):
             for k in range(3):
                 p = frames.shares[i] * positions[frames.joints[i], k]
                 point[k] = scale * (-p if left[n] and k == 0 else p)
-            quat_rotate_into(wrist[3:], point, own[i, :3])
+            joint = row[joints_at + 7 * i : joints_at + 7 * i + 7]
+            quat_rotate_into(wrist[3:], point, joint[:3])
             for k in range(3):
-                own[i, k] += wrist[k]
+                joint[k] += wrist[k]
             multiply_quats_into(quats[frames.bones[i]], 1.0, frames.offsets[1 if left[n] else 0, i], turned)
-            multiply_quats_into(wrist[3:], 1.0, turned, own[i, 3:])
+            multiply_quats_into(wrist[3:], 1.0, turned, joint[3:])
 
 
 @lru_cache(_HANDS_KEPT)
