@@ -1,6 +1,7 @@
 """The loop without sockets: two props, two actors, and what happens when something inside it breaks."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 from manipnet.synthesis.synthesizer import HandStep, Synthesizer
 from manipnet.telemetry import Telemetry
 from manipnet.wire import HandsMessage, encode_msgpack
+from manipnet.wire.numbers import numbers_of
 
 HERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -267,3 +269,17 @@ def test_the_same_mesh_is_built_once() -> None:
     one, other = catalog.load(cube), catalog.load(cube)
     assert one is other
     assert one.name == "cube"
+
+
+def test_the_numbers_of_a_message_are_those_of_its_parts(
+    bundle: Bundle, catalog: ObjectCatalog, tmp_path: Path
+) -> None:
+    telemetry = Telemetry()
+    shape = catalog.shape("cube")
+    actor = Actor(default_actor(), [Prop("prop", "cube", shape)], bundle, telemetry, 0.1)
+    messages = Bench(bundle, tmp_path, [actor], telemetry).play(1.0)
+    assert messages
+    for message in messages:
+        assert message.numbers is not None, "they were not found sound"
+        np.testing.assert_array_equal(message.numbers, numbers_of(message))
+        assert replace(message, seq=0).numbers is None, "a changed copy must be checked again"

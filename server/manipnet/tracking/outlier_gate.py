@@ -143,15 +143,15 @@ def _judge(histories: np.ndarray, rows: np.ndarray, samples: Array, t_s: float, 
             continue
         swapped = pose[_FAULT] < 0.0
         pose[_FAULT] = 0.0
-        if history.is_known == 0:
-            history.is_known = 1
-            history.changed_s = t_s
+        if history["is_known"] == 0:
+            history["is_known"] = 1
+            history["changed_s"] = t_s
             _accept(history, t_s, t_s, pose)
             continue
         # If nothing moves, a recording has ended or is paused, and no single body is frozen.
         others_move = (0.0 if changed else t_s - moved_s) < MOVING_S
         pose[_FAULT] = _fault(history, t_s, pose, swapped, others_move)
-        changed = changed or history.changed_s == t_s
+        changed = changed or history["changed_s"] == t_s
         faulty = faulty or pose[_FAULT] > 0.0
     return changed, faulty
 
@@ -165,7 +165,7 @@ def _find_swaps(histories: np.ndarray, rows: np.ndarray, samples: Array, t_s: fl
         for j in range(i):
             if samples[j, _FAULT] > 0.0 or not _is_fast(histories[rows[j]], samples[j], t_s):
                 continue
-            one, other = histories[rows[i]].pose, histories[rows[j]].pose
+            one, other = histories[rows[i]]["pose"], histories[rows[j]]["pose"]
             if max(_dist(samples[i], other), _dist(samples[j], one)) < SWAP_RATIO * _dist(one, other):
                 samples[i, _FAULT] = samples[j, _FAULT] = -1.0
 
@@ -173,45 +173,45 @@ def _find_swaps(histories: np.ndarray, rows: np.ndarray, samples: Array, t_s: fl
 @inner
 def _is_fast(history, pose: Array, t_s: float):
     """Whether a body moved so fast that it may have been taken for another."""
-    elapsed_s = t_s - history.t_s
-    recent = history.is_known == 1 and 0.0 < elapsed_s < CONFIRM_S
-    return recent and _dist(pose, history.pose) > SWAP_SPEED_M_S * elapsed_s
+    elapsed_s = t_s - history["t_s"]
+    recent = history["is_known"] == 1 and 0.0 < elapsed_s < CONFIRM_S
+    return recent and _dist(pose, history["pose"]) > SWAP_SPEED_M_S * elapsed_s
 
 
 @inner
 def _fault(history, t_s: float, pose: Array, swapped: bool, others_move: bool):
     """Why a tracked sample cannot be real, or 0; updates the history."""
-    elapsed_s = t_s - history.t_s
+    elapsed_s = t_s - history["t_s"]
     if elapsed_s < -FORGET_S:
         _accept(history, t_s, t_s, pose)
         return 0
-    if pose[0] == 0.0 and pose[1] == 0.0 and pose[2] == 0.0 and _dist(pose, history.pose) > MARGIN_M:
+    if pose[0] == 0.0 and pose[1] == 0.0 and pose[2] == 0.0 and _dist(pose, history["pose"]) > MARGIN_M:
         return _ZEROS
     if _is_still(history, t_s, pose) and others_move:
         return _FROZEN
     if elapsed_s > FORGET_S:
         _accept(history, t_s, t_s, pose)
         return 0
-    if not swapped and _is_near(history.pose, pose, abs(elapsed_s)) and _is_back(history, pose):
-        _accept(history, t_s, history.t_s, pose)
+    if not swapped and _is_near(history["pose"], pose, abs(elapsed_s)) and _is_back(history, pose):
+        _accept(history, t_s, history["t_s"], pose)
         return 0
-    if history.has_candidate == 0 or not _is_near(history.candidate, pose, abs(t_s - history.candidate_s)):
-        history.jumped_s = t_s
-    history.has_candidate = 1
-    history.candidate_s = t_s
-    _copy(pose, history.candidate)
-    if t_s - history.jumped_s < CONFIRM_S:
+    if history["has_candidate"] == 0 or not _is_near(history["candidate"], pose, abs(t_s - history["candidate_s"])):
+        history["jumped_s"] = t_s
+    history["has_candidate"] = 1
+    history["candidate_s"] = t_s
+    _copy(pose, history["candidate"])
+    if t_s - history["jumped_s"] < CONFIRM_S:
         return _SWAP if swapped else _JUMP
-    _accept(history, t_s, history.t_s, pose)
+    _accept(history, t_s, history["t_s"], pose)
     return 0
 
 
 @inner
 def _accept(history, t_s: float, newest_s: float, pose: Array):
     if t_s >= newest_s:  # a late sample is accepted but is not the newest
-        history.t_s = t_s
-        _copy(pose, history.pose)
-    history.has_candidate = 0
+        history["t_s"] = t_s
+        _copy(pose, history["pose"])
+    history["has_candidate"] = 0
 
 
 @inner
@@ -225,7 +225,7 @@ def _is_near(known: Array, pose: Array, elapsed_s: float):
 @inner
 def _is_back(history, pose: Array):
     """Whether a body that jumped is nearer to where it came from than to where it went."""
-    return history.has_candidate == 0 or _distance_m(history.pose, pose) < _distance_m(history.candidate, pose)
+    return history["has_candidate"] == 0 or _distance_m(history["pose"], pose) < _distance_m(history["candidate"], pose)
 
 
 @inner
@@ -236,24 +236,24 @@ def _is_still(history, t_s: float, pose: Array):
     """
     same = True
     for k in range(7):
-        same = same and pose[k] == history.pose[k]
+        same = same and pose[k] == history["pose"][k]
     if same:
-        return history.has_noise == 1 and t_s - history.changed_s > FROZEN_S
-    if history.has_noise == 0:
+        return history["has_noise"] == 1 and t_s - history["changed_s"] > FROZEN_S
+    if history["has_noise"] == 0:
         _learn_noise(history, pose)
-    history.changed_s = t_s
+    history["changed_s"] = t_s
     return False
 
 
 @inner
 def _learn_noise(history, pose: Array):
     for axis in range(3):
-        one, before, turns = pose[axis] - history.pose[axis], history.step[axis], history.noise_turns
+        one, before, turns = pose[axis] - history["pose"][axis], history["step"][axis], history["noise_turns"]
         if NOISE_M[0] < abs(one) < NOISE_M[1]:
             turns[axis] = turns[axis] + 1 if one * before < 0.0 else max(turns[axis] - 1, 0)
             if turns[axis] >= NOISE_TURNS:
-                history.has_noise = 1
-        history.step[axis] = one
+                history["has_noise"] = 1
+        history["step"][axis] = one
 
 
 @inner

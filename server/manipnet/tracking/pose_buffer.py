@@ -94,7 +94,8 @@ class PoseBuffer:
         Returns how many samples may be used, which are those up to the first one at or after `until_s`, the instant of
         the last of them, and the age at `present_s` of the newest one before it, which is infinite if there is none.
         """
-        return _resample(self._times, self._poses, self._count, times_s, present_s, until_s, out)
+        known, last_s, age_s = _resample(self._times, self._poses, self._count, times_s, present_s, until_s, out)
+        return known, float(last_s), float(age_s)
 
 
 def sample(
