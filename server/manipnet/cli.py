@@ -30,7 +30,7 @@ from manipnet.config.settings import (
     parse_object,
     server_config,
 )
-from manipnet.runtime.memory import check_address_space, share_arenas
+from manipnet.runtime.memory import check_address_space, leave_out_linear_algebra, share_arenas
 from manipnet.runtime.start_progress import StartProgress
 from manipnet.synthesis.hand.shipped_files import hand_file
 from manipnet.synthesis.model.shipped import BundleError, version_text
@@ -169,6 +169,7 @@ def _serve(config: ServerConfig, json_log: bool, opens_page: bool) -> int:
 def _serve_with(console: "Console", config: ServerConfig, opens_page: bool) -> int:
     share_arenas()
     with StartProgress(console.show, _log.info, console.is_terminal) as progress:
+        leave_out_linear_algebra()
         from manipnet.runtime.precompile import Precompiler
 
         precompiler = Precompiler()

@@ -46,3 +46,20 @@ def test_threads_share_the_arenas_of_the_allocator() -> None:
         for how in ("shared", "own")
     )
     assert shared < own, "kB of address space"
+
+
+WITHOUT = """
+import sys
+from manipnet.runtime.memory import leave_out_linear_algebra
+leave_out_linear_algebra()
+import numpy as np
+from manipnet.synthesis.soundness import are_sound
+assert are_sound(np.ones(4), np.array([[0, 1, 2, 3]]), 1.0, 3.0)
+assert "scipy.linalg" not in sys.modules, "a kernel has loaded it"
+import scipy.linalg
+assert scipy.linalg.det(np.eye(2)) == 1.0, "it can be loaded later"
+"""
+
+
+def test_a_server_does_without_scipys_linear_algebra() -> None:
+    subprocess.run([sys.executable, "-W", "error", "-c", WITHOUT], check=True, timeout=120.0)

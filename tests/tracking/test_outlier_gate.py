@@ -9,7 +9,8 @@ import pytest
 
 from manipnet.inputs.natnet.frames import read_frame
 from manipnet.telemetry import BODY_REASONS
-from manipnet.tracking.outlier_gate import CONFIRM_S, FORGET_S, FROZEN_S, MAX_BODIES, OutlierGate
+from manipnet.tracking.outlier_gate import MAX_BODIES, OutlierGate
+from manipnet.tracking.outliers import CONFIRM_S, FORGET_S, FROZEN_S
 from manipnet.wire.bodies import BodyFrame, BodySample
 from manipnet_tools.takes.take import read_take
 

@@ -13,6 +13,7 @@ from manipnet.synthesis.soundness import are_sound
 from manipnet.tracking.tick import Tick
 from manipnet.wire import BodyPose, HandPose, HandsMessage, Latency, Side
 from manipnet.wire.numbers import (
+    HAND_COLUMNS,
     HAND_NUMBERS,
     LATENCIES,
     TIMES,
@@ -70,7 +71,7 @@ def _put_hands(model: Hand, hands: Mapping[Side, ShownHand], scale: float, rows:
     given = hand_arrays(rows)
     for i, hand in enumerate(hands.values()):
         rows[i, 0], given.angles[i], given.wrist[i] = scale, hand.angles, hand.wrist
-    place_in_world(model, list(hands), rows)
+    place_in_world(model, list(hands), HAND_COLUMNS, rows)
     return {
         side: HandPose(hand.state, hand.prop, scale, *arrays)
         for (side, hand), arrays in zip(hands.items(), zip(*given, strict=True), strict=True)

@@ -3,6 +3,7 @@
 import ctypes
 import sys
 from contextlib import suppress
+from importlib import import_module
 from typing import Final
 
 from manipnet.common.options import ConfigError
@@ -40,3 +41,15 @@ def share_arenas() -> None:
     if sys.platform == "linux":
         with suppress(OSError, AttributeError):  # another C library
             ctypes.CDLL(None).mallopt(_M_ARENA_MAX, ARENAS)
+
+
+def leave_out_linear_algebra() -> None:
+    """Keep Numba from loading SciPy's linear algebra, which takes 9 MB and is of no use: no kernel multiplies matrices
+    by it. Call this before kernels are loaded; other code can load it later."""
+    if "scipy.linalg" in sys.modules:
+        return
+    sys.modules["scipy.linalg"] = None  # pyright: ignore[reportArgumentType]: such a module cannot be imported
+    try:
+        import_module("numba.np.arraymath")  # it looks for it now, or else with the first kernel
+    finally:
+        del sys.modules["scipy.linalg"]

@@ -34,10 +34,13 @@ def compile_aside() -> None:
     from manipnet.synthesis.model.shipped import shipped_hand
     from manipnet.synthesis.objects.distance_field import build_field
     from manipnet.synthesis.objects.shape import load_shape
+    from manipnet.synthesis.soundness import are_sound
     from manipnet.synthesis.synthesizer import HandScene, windows_of
     from manipnet.tracking.forecast import damped_velocity
+    from manipnet.tracking.outlier_gate import OutlierGate
     from manipnet.tracking.pose_buffer import PoseBuffer, sample
     from manipnet.tracking.smoothing import Smoothing
+    from manipnet.wire.bodies import BodyFrame, BodySample
 
     still = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (21, 1))
     scene = HandScene("right", still, still, still, load_shape("cube"))
@@ -51,6 +54,10 @@ def compile_aside() -> None:
     sample([track], np.linspace(-0.5, 0.5, 21), 0.0, 0.1, damped_velocity, smoothing)
     keep_angles(angles, hand.limits.copy(), angles, 1.0, np.empty_like(angles))
     pose_in_world(hand, ["right"], angles[None], still[:1], 1.0)
+    are_sound(angles, np.zeros((1, 4), np.intp), 1.0, 1.0)
+    OutlierGate().check(
+        BodyFrame(0.0, None, (BodySample(1, None, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), True),), 0.0, "")
+    )
     carry_a_hand(hand, scene.shape)
 
 

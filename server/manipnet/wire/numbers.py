@@ -23,7 +23,7 @@ HAND_SHAPES: Final = tuple((name, dtype.shape) for name, dtype in RECORDS[HandPo
 _SIZES = tuple(prod(shape) for _, shape in HAND_SHAPES)
 _STARTS = {name: 1 + sum(_SIZES[:place]) for place, (name, _) in enumerate(HAND_SHAPES)}
 HAND_NUMBERS: Final = 1 + sum(_SIZES)
-HAND_COLUMNS: Final = tuple(_STARTS.values())
+HAND_COLUMNS: Final = _STARTS["angles"], _STARTS["rotations"], _STARTS["wrist"], _STARTS["joints"]
 """Where each of these arrays begins among the numbers of a hand."""
 LATENCIES: Final = tuple(field.name for field in fields(Latency))
 

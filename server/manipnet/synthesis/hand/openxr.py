@@ -18,7 +18,6 @@ from manipnet.synthesis.hand.hand import MAX_ANGLES, MAX_JOINTS, Hand, Indices
 from manipnet.synthesis.hand.kinematics import forward_kinematics, forward_kinematics_into
 from manipnet.synthesis.hand.packed import unpack_skeleton
 from manipnet.synthesis.rotations import matrix_to_quat_into, multiply_quats_into, quat_rotate_into
-from manipnet.wire.numbers import HAND_COLUMNS, HAND_NUMBERS, hand_arrays
 
 METACARPAL_BASE: Final = 0.3
 """Where a finger's metacarpal begins on the way from the wrist to its knuckle; the palm of our hand is one bone."""
@@ -51,18 +50,24 @@ def pose_in_world(
     them. Finger metacarpals, which our hand lacks, and the palm turn with the wrist; the palm lies in the middle of the
     middle metacarpal.
     """
-    rows = np.empty((len(sides), HAND_NUMBERS))
-    given = hand_arrays(rows)
-    rows[:, 0], given.angles[:], given.wrist[:] = scale, angles, T_world_wrist
-    place_in_world(hand, sides, rows)
-    return np.ascontiguousarray(given.rotations), np.ascontiguousarray(given.joints)
+    count, bones, joints = len(sides), hand.bone_count, len(openxr_frames(hand).joints)
+    rotations_at = 1 + hand.angle_count
+    columns = 1, rotations_at, rotations_at + 4 * bones, rotations_at + 4 * bones + 7
+    rows = np.empty((count, columns[-1] + 7 * joints))
+    rows[:, 0], rows[:, 1:rotations_at], rows[:, columns[2] : columns[3]] = scale, angles, T_world_wrist
+    place_in_world(hand, sides, columns, rows)
+    local, placed = rows[:, rotations_at : columns[2]], rows[:, columns[3] :]
+    return local.reshape(count, bones, 4).copy(), placed.reshape(count, joints, 7).copy()
 
 
-def place_in_world(hand: Hand, sides: Sequence[Side], rows: Array) -> None:
-    """Complete what messages say of hands, `rows (N, HAND_NUMBERS)` of which the sizes, angles and wrists are given, by
-    rotations and joints as `pose_in_world` has them."""
+def place_in_world(hand: Hand, sides: Sequence[Side], columns: tuple[int, int, int, int], rows: Array) -> None:
+    """Complete `rows (N, …)` with the numbers of N hands by rotations and joints as `pose_in_world` has them.
+
+    A row begins with the size, which is given. The `columns` are where angles, rotations, wrist and joints begin;
+    angles and wrist are given too.
+    """
     left = np.array([side == "left" for side in sides])
-    _place_in_world(hand.packed, openxr_frames(hand), left, HAND_COLUMNS, rows)
+    _place_in_world(hand.packed, openxr_frames(hand), left, columns, rows)
 
 
 @kernel
