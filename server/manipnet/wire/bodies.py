@@ -6,8 +6,8 @@ message does not spoil the frame: that body becomes untracked, and its `fault` s
 
 import json
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, TypeGuard
 
 import msgpack
 
@@ -117,9 +117,7 @@ def _sample_map(body: BodySample) -> dict[str, Any]:
     return {key: value for key, value in keys.items() if value is not None} | pose
 
 
-def make_sample(
-    id: int | None, name: str | None, p: tuple[float, ...], q: tuple[float, ...], tracked: bool
-) -> BodySample:
+def make_sample(id: int | None, name: str | None, p: Sequence[float], q: Sequence[float], tracked: bool) -> BodySample:
     """A sample with a unit quaternion from three and four floats, or an untracked sample with its fault."""
     px, py, pz = p
     x, y, z, w = q
@@ -142,9 +140,14 @@ def check_distinct(bodies: tuple[BodySample, ...]) -> None:
             raise MessageError(f"two bodies have the {key} {twice!r}; each body may occur once per frame")
 
 
+def is_name(name: object) -> TypeGuard[str]:
+    """Whether something is the name of a body: 1 to `MAX_NAME_CHARS` printable characters."""
+    return isinstance(name, str) and 0 < len(name) <= MAX_NAME_CHARS and name.isprintable()
+
+
 def check_name(name: object, where: str) -> str:
     """The name of a body, if it is 1 to `MAX_NAME_CHARS` printable characters, which can be logged as they are."""
-    if not isinstance(name, str) or not 0 < len(name) <= MAX_NAME_CHARS or not name.isprintable():
+    if not is_name(name):
         allowed = f"1 to {MAX_NAME_CHARS} printable characters"
         raise MessageError(f"{where} is {_show(name)}; it must be text of {allowed}")
     return name
@@ -187,17 +190,22 @@ def _body(entry: object, i: int) -> BodySample:
         raise MessageError(f"bodies[{i}] has neither id nor name; it must have at least one of them")
     if id is not None and not _is_int(id, 31):
         raise MessageError(f"bodies[{i}].id is {_show(id)}; it must be an integer of at most 31 bits")
-    if name is not None:
+    if name is not None and not is_name(name):
         check_name(name, f"bodies[{i}].name")
     tracked = entry.get("tracked")
     if tracked is None:
         tracked = True
     elif not isinstance(tracked, bool):
         raise MessageError(f"bodies[{i}].tracked is {_show(tracked)}; it must be true or false")
-    return make_sample(id, name, _numbers(entry, "p", 3, i), _numbers(entry, "q", 4, i), tracked)
+    p: Any = entry.get("p")
+    q: Any = entry.get("q")
+    is_usual = type(p) is list and type(q) is list and len(p) == 3 and len(q) == 4
+    if not is_usual or {*map(type, p), *map(type, q)} != _FLOATS:
+        p, q = _numbers(entry, "p", 3, i), _numbers(entry, "q", 4, i)
+    return make_sample(id, name, p, q, tracked)
 
 
-def _fault(p: tuple[float, ...], q: tuple[float, ...]) -> str:
+def _fault(p: Sequence[float], q: Sequence[float]) -> str:
     if not all(map(math.isfinite, (*p, *q))):
         return "nan"
     return "bounds" if max(map(abs, p)) > MAX_COORDINATE_M else "zero_quaternion"
