@@ -25,7 +25,7 @@ EXAMPLES = """examples:
 EXTRAS = {"torch": "train", "onnx": "train", "matplotlib": "train", "ray": "cluster", "mujoco": "judge"}
 """Libraries that a plain installation lacks, and the extra that installs each."""
 OWN_EXTRAS = {"generate": "generate"}
-"""Verbs whose libraries an extra of their own installs."""
+"""Verbs whose libraries an extra of their own installs, apart from those for training."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -71,7 +71,8 @@ def _guarded(name: str, rest: list[str]) -> int:
     except ModuleNotFoundError as error:
         if error.name not in EXTRAS and name not in OWN_EXTRAS:
             raise
-        extra = OWN_EXTRAS.get(name) or EXTRAS[error.name or ""]
+        trains = EXTRAS.get(error.name or "") == "train"
+        extra = OWN_EXTRAS[name] if name in OWN_EXTRAS and not trains else EXTRAS[error.name or ""]
         remedy = f"{error.name} is not installed: python -m pip install 'manipnet-live[{extra}]'"
         print(f"manipnet {name}: {remedy}", file=sys.stderr)
     except BrokenPipeError:

@@ -5,6 +5,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.model.shipped import find_bundle, shipped_hand
 from manipnet_tools.generate.free_hand import FREE_HAND
 from manipnet_tools.takes.sources import foreign_terms
+from manipnet_tools.training.config import FOR_GENERATED
 
 ROOT = Path(__file__).parents[3]
 CARD = find_bundle("manipnet-open") / "CARD.md"
@@ -52,10 +54,10 @@ def listed(heading: str) -> dict[str, str]:
 def test_generating_and_training_read_what_the_card_lists(tmp_path: Path) -> None:
     pytest.importorskip("mujoco", reason="needs the extra generate")
     pytest.importorskip("manifold3d", reason="needs the extra generate")
-    data, model = str(tmp_path / "set"), str(tmp_path / "model")
-    small = ["--training.width", "6", "--training.rounds", "2", "--training.round-samples", "256"]
-    read = read_by(tmp_path, "generate", "--out", data, "--hours", "0.008", "--jobs", "1")
-    read |= read_by(tmp_path, "train", "--free", "--data", data, "--out", model, *small)
+    model = tmp_path / "model"
+    arguments = ["--out", str(tmp_path / "set"), "--train", str(model), "--hours", "0.008", "--jobs", "1"]
+    read = read_by(tmp_path, "generate", *arguments)
+    assert load_bundle(str(model)).meta["licence"].startswith("Apache-2.0")
     inputs = listed("Inputs")
     assert read == inputs.keys()
     assert {name: sha256((ROOT / name).read_bytes()).hexdigest() for name in read} == inputs
@@ -75,6 +77,13 @@ def test_the_terms_allow_commercial_use() -> None:
     assert bundle.meta["licence"].startswith("Apache-2.0")
     assert all(take.startswith("generated-") for take in bundle.meta["training"]["takes"])
     assert not bundle.meta["training"]["started_from"]
+
+
+def test_the_shipped_model_was_trained_by_the_recipe_of_the_command() -> None:
+    training = load_bundle("manipnet-open").meta["training"]
+    assert {name: training[name] for name in asdict(FOR_GENERATED) if name != "hidden"} == {
+        name: value for name, value in asdict(FOR_GENERATED).items() if name != "hidden"
+    }
 
 
 def test_the_hand_is_not_that_of_the_captured_subject() -> None:

@@ -37,10 +37,10 @@ def require_new(path: Path | None, force: bool, option: str = "--out") -> None:
         raise ConfigError(already_exists(f"{option} {path}"))
 
 
-def require_new_bundle(folder: Path, force: bool) -> None:
-    """Raise `ConfigError` if there is a bundle in the folder of `--out` already, unless `force` says to replace it."""
+def require_new_bundle(folder: Path, force: bool, option: str = "--out") -> None:
+    """Raise `ConfigError` if there is a bundle in an option's folder already, unless `force` says to replace it."""
     if (folder / "bundle.json").exists() and not force:
-        raise ConfigError(already_exists(f"--out {folder}: a bundle"))
+        raise ConfigError(already_exists(f"{option} {folder}: a bundle"))
 
 
 def already_exists(what: str) -> str:

@@ -107,6 +107,7 @@ VERBS = {
         "manipnet_tools.generate.options.GenerateOptions",
         (
             "--out generated --hours 4                        on all processors; run it again to continue",
+            "--out generated --hours 2 --train models/mine    and train a model, by the recipe of manipnet-open",
             "--out generated --hours 40 --ray 192.168.1.7:6379      on a Ray cluster",
         ),
     ),

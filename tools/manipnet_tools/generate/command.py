@@ -19,6 +19,7 @@ from manipnet_tools.generate.options import GenerateOptions
 from manipnet_tools.generate.proportions import HANDS
 from manipnet_tools.generate.sheet import write_grasp_sheet
 from manipnet_tools.generate.statistics import print_statistics, statistics
+from manipnet_tools.generate.training import require_training, train_on
 from manipnet_tools.importing.dataset_writer import write_mesh
 from manipnet_tools.takes.dataset import TAKE_FILE
 from manipnet_tools.takes.sources import TakeSource, add_sources
@@ -26,7 +27,7 @@ from manipnet_tools.takes.take_file import write_take_file
 from manipnet_tools.terminal import open_console
 
 SET_FILE: Final = "generate.json"
-RECIPE: Final = 4
+RECIPE: Final = 5
 """Raised when the same seed gives other takes than before."""
 LICENCE: Final = "Apache-2.0"
 SHEET_FILE: Final = "grasps.png"
@@ -37,7 +38,12 @@ class GenerateError(ValueError):
 
 
 def run(options: GenerateOptions) -> None:
-    """Make every take that is missing. Raises `GenerateError`, `ClusterError` and `OSError`."""
+    """Make every take that is missing, and train on them if asked to.
+
+    Raises `GenerateError`, `ClusterError`, `OSError`, and what training raises.
+    """
+    if options.train is not None:
+        require_training()
     count = max(math.ceil(options.hours * 3600.0 / TAKE_S), 1)
     _begin(options, count)
     missing = [k for k in range(count) if not (options.out / "takes" / take_name(k) / TAKE_FILE).is_file()]
@@ -54,7 +60,9 @@ def run(options: GenerateOptions) -> None:
         file.write(json.dumps(found, indent=1).encode())
     print_statistics(found, console)
     write_grasp_sheet(options.out, options.out / SHEET_FILE)
-    console.print(f"look at {options.out / SHEET_FILE}, then: manipnet train --data {options.out} --out models/mine")
+    console.print(f"look at {options.out / SHEET_FILE}")
+    if options.train is not None:
+        train_on(options.out, options.train, options.seed)
 
 
 def _begin(options: GenerateOptions, count: int) -> None:

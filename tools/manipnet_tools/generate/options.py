@@ -6,6 +6,7 @@ from typing import Annotated, Final
 
 from manipnet.common.options import ConfigError
 from manipnet_tools.commands.arguments import arg
+from manipnet_tools.commands.checks import require_new_bundle
 
 MOST_HOURS: Final = 800.0
 """So many takes have names of five digits."""
@@ -29,8 +30,13 @@ class GenerateOptions:
     ray: Annotated[str | None, arg(metavar="ADDRESS", help_behavior_hint="")] = None
     """Work on a Ray cluster instead: HOST:PORT, auto for the one on this machine, or local to start one here."""
 
+    train: Annotated[Path | None, arg(metavar="BUNDLE", help_behavior_hint="")] = None
+    """Then train a model on these takes, by the recipe of manipnet-open, and write it to this folder."""
+
     def check(self) -> None:
-        """Raise `ConfigError` for a number out of range."""
+        """Raise `ConfigError` for a number out of range or a bundle that exists already."""
+        if self.train is not None:
+            require_new_bundle(self.train, force=False, option="--train")
         if not 0.0 < self.hours <= MOST_HOURS:
             raise ConfigError(f"--hours is {self.hours:g}; it must be above 0 and at most {MOST_HOURS:g}")
         if self.seed < 0:

@@ -72,3 +72,7 @@ class TrainConfig:
                 "--training.captured, --training.blended and --training.on-policy must not be negative, and one of the "
                 "first two must be above 0"
             )
+
+
+FOR_GENERATED: Final = TrainConfig(rounds=8, epochs_per_round=4, sliding=0.5)
+"""The recipe of `manipnet-open`, for takes of `manipnet generate`."""
