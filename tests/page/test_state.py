@@ -1,5 +1,6 @@
 """What the page says about a session: state, rate and age never contradict each other."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,11 +47,7 @@ def test_durations_are_read_at_a_glance() -> None:
 
 
 def published(seq: int, t_s: float):
-    return message().__class__(**{**_fields(message()), "seq": seq, "t_publish": t_s})
-
-
-def _fields(value: Any) -> dict[str, Any]:
-    return {name: getattr(value, name) for name in value.__dataclass_fields__}
+    return replace(message(), seq=seq, t_publish=t_s)
 
 
 def test_the_rate_is_zero_once_nothing_comes_and_a_gap_stays_a_gap() -> None:
