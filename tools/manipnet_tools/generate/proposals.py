@@ -26,6 +26,9 @@ FACING: Final = 0.75
 """Cosine between a pad and the line to the other one."""
 WIDEST_HELD_M: Final = 0.13
 """One hand does not reach around what is wider everywhere."""
+THIN_M: Final = 0.01
+"""Stems, pens and spoons that are thinner are held by the tips of thumb, index and middle finger more often than in a
+fist (Napier 1956)."""
 CONE_RAD: Final = np.radians(30.0)
 ONE_SIDED: Final = ("flat", "press")
 """Kinds in which all digits press from the same side."""
@@ -138,7 +141,9 @@ def kinds_for(sites: Sequence[Site], narrowest_m: float) -> tuple[str, ...]:
     kinds: list[str] = ["palm", "palm", "above", "above", *3 * ("pinch",), *3 * ("tripod",), "flat"]
     if "bar" in held:
         kinds += ["bar"] * 10 + ["hook"] * 8
-    if "stick" in held:
+    if any(site.kind == "stick" and site.radius < THIN_M for site in sites):
+        kinds += ["bar"] * 3 + ["tripod"] * 8 + ["pinch"] * 4
+    elif "stick" in held:
         kinds += ["bar"] * 10 + ["tripod"] * 2
     if "rim" in held:
         kinds += ["pinch", "tripod", "lateral"] * 2
@@ -202,7 +207,7 @@ def _pinched(pinches: Pinches, held: tuple[Array, Array, Array, float], kind: st
     wanted[0], wanted[1] = _PRECISE, (0.3, 2.0, 0.6) if kind == "lateral" else _PRECISE
     if kind == "tripod":
         wanted[2] = _PRECISE
-        if rng.random() < 0.4:
+        if rng.random() < 0.25:
             wanted[3:] = _PRECISE
     needed = (0, 1, 2) if kind == "tripod" else (0, 1)
     return Proposal(kind, turn, place, wanted, needed, frame[:, 0], SIDES)
