@@ -14,8 +14,7 @@ from manipnet.synthesis.objects.shape import Shape
 from manipnet_tools.generate.approaches import approach
 from manipnet_tools.generate.contact import Space, mirrored_space, space_around
 from manipnet_tools.generate.finger_tables import Tables
-from manipnet_tools.generate.grasps import Grasp, find_grasp
-from manipnet_tools.generate.in_hand import moved_in_hand
+from manipnet_tools.generate.grasps import Grasp, find_grasp, shifted_grasp
 from manipnet_tools.generate.mirrored import Mirrored, Surface, mirrored_corners, mirrored_sites
 from manipnet_tools.generate.proposals import Pinches, kinds_for, propose
 from manipnet_tools.generate.shapes import MadeShape
@@ -26,8 +25,8 @@ from manipnet_tools.generate.two_hands import DOWNS, TwoHands
 WANTED: Final = 12
 """Grasps for each hand."""
 MOST_TRIES: Final = 240
-WAYS: Final = 3
-"""In so many directions an object may move in the hand."""
+SHIFTS: Final = 4
+"""A hand that holds is never quite still: so many poses near each grasp are tried."""
 _ALIKE: Final = 0.34
 """No kind makes up more than this share of a hand's grasps while others are still found."""
 
@@ -48,8 +47,8 @@ class Held:
     """`(J, 3)`"""
     touching: int
     """How many capsules touch."""
-    ways: tuple[tuple[tuple[Array, Array], ...], ...]
-    """Ways on which the object may move in the hand: poses of the wrist, each with the angles of the fingers there."""
+    shifts: tuple[tuple[Array, Array], ...]
+    """Poses of the wrist nearby, with the angles at which the same fingers still touch."""
     pair: int = -1
     """Two hands that hold only together have the same number, others -1."""
 
@@ -155,22 +154,16 @@ def _candidates(
 def _held(tables: Tables, seen: _Side, grasp: Grasp, pair: int, rng: Generator) -> Held:
     """The grasp in the object's own frame, with the way to it."""
     opened, back = approach(tables, seen.space, grasp)
-    centre = seen.surface.center_of_mass
-    ways = [way for _ in range(WAYS) if (way := moved_in_hand(tables, seen.space, grasp, centre, rng))]
-    pose = _wrist(seen.side, grasp)
+    shifts = [shifted for _ in range(SHIFTS) if (shifted := shifted_grasp(tables, seen.space, grasp, rng)) is not None]
+    poses = np.array([pose_of(each) for each in (grasp, *shifts)])
     downs = grasp.downs if pair < 0 else DOWNS
-    joints = transform(pose_of(grasp), forward_kinematics(tables.hand, grasp.angles)[0])
+    joints = transform(poses[0], forward_kinematics(tables.hand, grasp.angles)[0])
     if seen.side == "left":
-        joints, back = mirror_points(joints), mirror_points(back)
+        poses, joints, back = mirror_poses(poses), mirror_points(joints), mirror_points(back)
         downs = downs if pair >= 0 else mirror_points(downs)
-    steps = tuple(tuple((_wrist(seen.side, step), step.angles) for step in way) for way in ways)
+    near = tuple((pose, shifted.angles) for pose, shifted in zip(poses[1:], shifts, strict=True))
     touching = int(grasp.touching.sum())
-    return Held(seen.side, grasp.kind, pose, grasp.angles, opened, back, downs, joints, touching, steps, pair)
-
-
-def _wrist(side: Side, grasp: Grasp) -> Array:
-    pose = pose_of(grasp)
-    return mirror_poses(pose) if side == "left" else pose
+    return Held(seen.side, grasp.kind, poses[0], grasp.angles, opened, back, downs, joints, touching, near, pair)
 
 
 def apart(first: Held, second: Held, least_m: float) -> bool:

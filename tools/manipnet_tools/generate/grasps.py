@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from manipnet.geometry import Array
@@ -26,6 +27,8 @@ TOUCH_M: Final = 0.0025
 DEEPEST_M: Final = 0.0038
 OVERLAP_M: Final = 0.0045
 FOREARM_M: Final = 0.028
+SHIFT_M, SHIFT_RAD = 0.004, 0.06
+"""How far a wrist moves about a grasp, along and about each axis, one standard deviation."""
 NEIGHBOURS: Final = 0.05
 """What it costs that neighbouring fingers bend differently."""
 OPPOSED: Final = 3.0
@@ -53,7 +56,7 @@ class Grasp:
 def find_grasp(tables: Tables, space: Space, proposal: Proposal, centre: Array, refused: Counter[str]) -> Grasp | None:
     """The grasp at a proposed pose, or nothing; `refused` counts why not. `centre (3,)` is the centre of mass."""
     turn, place = np.ascontiguousarray(proposal.turn), np.ascontiguousarray(proposal.place)
-    if not arm_free(space, turn, place):
+    if not _arm_free(space, turn, place):
         refused["arm or palm inside"] += 1
         return None
     proposal = replace(proposal, wanted=_taking_part(tables, space, turn, place, proposal))
@@ -70,7 +73,7 @@ def find_grasp(tables: Tables, space: Space, proposal: Proposal, centre: Array, 
     return None
 
 
-def arm_free(space: Space, turn: Array, place: Array) -> bool:
+def _arm_free(space: Space, turn: Array, place: Array) -> bool:
     """Whether the wrist and a straight forearm are outside the object."""
     return all(
         distance_of(space, place - 0.02 * k * turn[:, 0]) > (0.018 if k == 0 else FOREARM_M) for k in range(0, 9, 2)
@@ -160,14 +163,14 @@ def _settled(
     stiff = np.concatenate([np.full(20, 1.0 / 0.3), np.full(3, 1.0 / 0.08), np.full(3, 1.0 / 0.005)])
     stiff[5::4] = 1.0 / 0.12
     x = settle(space, body, angles, turn, place, wants, stiff, _ROUNDS)
-    turned, moved, posed = turn @ rotation(x[20:23]), place + x[23:], x[:20].copy()
+    turned, moved, posed = turn @ _rotation(x[20:23]), place + x[23:], x[:20].copy()
     turned, moved = np.ascontiguousarray(turned), np.ascontiguousarray(moved)
     gaps, points, normals, clear = look(space, body, posed, turned, moved)
     if gaps.min() < -DEEPEST_M:
         return None, "too deep"
     if clear < -OVERLAP_M:
         return None, "fingers overlap"
-    if not arm_free(space, turned, moved):
+    if not _arm_free(space, turned, moved):
         return None, "arm or palm inside"
     touching = np.asarray(gaps < TOUCH_M)
     digits: NDArray[np.bool_] = np.any(touching[4:].reshape(5, 3), axis=1)
@@ -179,8 +182,27 @@ def _settled(
     return Grasp(proposal.kind, turned, moved, posed, proposal.along, touching, proposal.downs), ""
 
 
-def rotation(vector: Array) -> Array:
-    """The matrix `(3, 3)` of a rotation about `vector (3,)` by its length, radians (Rodrigues)."""
+def shifted_grasp(tables: Tables, space: Space, grasp: Grasp, rng: Generator) -> Grasp | None:
+    """The same grasp after a small motion of the wrist, or nothing if the fingers cannot follow it.
+
+    The fingers that touch go on touching, about where they did; the others stay as they are.
+    """
+    turn = np.ascontiguousarray(grasp.turn @ _rotation(rng.normal(0.0, SHIFT_RAD, 3)))
+    place = grasp.place + rng.normal(0.0, SHIFT_M, 3)
+    stiff = np.concatenate([np.full(20, 1.0 / 0.3), np.full(6, 1e6)])
+    stiff[5::4] = 1.0 / 0.12
+    angles = settle(space, tables.body, grasp.angles, turn, place, grasp.touching.astype(float), stiff, _ROUNDS)[
+        :20
+    ].copy()
+    gaps, _, _, clear = look(space, tables.body, angles, turn, place)
+    touched = np.any(grasp.touching[4:].reshape(5, 3), axis=1)
+    off = np.min(gaps[4:].reshape(5, 3), axis=1)[touched].max(initial=0.0) > 2.0 * TOUCH_M
+    if off or gaps.min() < -DEEPEST_M or clear < -OVERLAP_M:
+        return None
+    return replace(grasp, turn=turn, place=place, angles=angles)
+
+
+def _rotation(vector: Array) -> Array:
     angle = float(np.linalg.norm(vector))
     x, y, z = vector / max(angle, 1e-12)
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

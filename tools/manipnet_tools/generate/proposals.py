@@ -26,20 +26,13 @@ FACING: Final = 0.75
 """Cosine between a pad and the line to the other one."""
 WIDEST_HELD_M: Final = 0.13
 """One hand does not reach around what is wider everywhere."""
-THIN_M: Final = 0.01
-"""Stems, pens and spoons that are thinner are held by the tips of thumb, index and middle finger more often than in a
-fist (Napier 1956)."""
 CONE_RAD: Final = np.radians(30.0)
 ONE_SIDED: Final = ("flat", "press")
 """Kinds in which all digits press from the same side."""
-_FARTHEST_M: Final = 0.02
+_FARTHEST_M: Final = 0.04
 """People hold with the fingers that are near: a ring or little finger takes part less often, the farther its knuckle is
 from the object, and never beyond this."""
-_FEW: Final = 0.2
-"""How often the little finger stays away wherever it is, and as often the ring finger too: people hold most things with
-the thumb and two or three fingers (Bullock et al. 2013)."""
-_POWER, _AROUND = (0.6, 1.0, 1.2), (0.25, 1.0, 1.2)
-_PRECISE, _HOOK, _FLAT = (0.0, 0.15, 2.0), (0.8, 1.2, 1.0), (0.5, 0.5, 0.6)
+_POWER, _PRECISE, _HOOK, _FLAT = (0.6, 1.0, 1.2), (0.0, 0.15, 2.0), (0.8, 1.2, 1.0), (0.5, 0.5, 0.6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +131,10 @@ def kinds_for(sites: Sequence[Site], narrowest_m: float) -> tuple[str, ...]:
     if narrowest_m > WIDEST_HELD_M:
         return ("press",)
     held = {site.kind for site in sites}
-    kinds: list[str] = ["palm", "palm", "above", "above", *3 * ("pinch",), *3 * ("tripod",), "flat"]
+    kinds: list[str] = ["palm", "palm", "palm", "above", "above", "pinch", "pinch", "tripod", "tripod", "flat"]
     if "bar" in held:
         kinds += ["bar"] * 10 + ["hook"] * 8
-    if any(site.kind == "stick" and site.radius < THIN_M for site in sites):
-        kinds += ["bar"] * 3 + ["tripod"] * 8 + ["pinch"] * 4
-    elif "stick" in held:
+    if "stick" in held:
         kinds += ["bar"] * 10 + ["tripod"] * 2
     if "rim" in held:
         kinds += ["pinch", "tripod", "lateral"] * 2
@@ -181,8 +172,8 @@ def _around(tables: Tables, site: Site, kind: str, rng: Generator) -> Proposal:
         ]
     at[1] = rng.uniform(-0.028, 0.012)
     place = site.point - turn @ np.array(at)
-    thumb = _POWER if not hooked or rng.random() < 0.75 else (0.0, 0.5, 0.8)
-    wanted = _by_few(np.array([thumb, *[_HOOK if hooked else _POWER] * 4]), rng)
+    thumb = _POWER if not hooked or rng.random() < 0.5 else (0.0, 0.5, 0.8)
+    wanted = np.array([thumb, *[_HOOK if hooked else _POWER] * 4])
     upright = hooked or (site.kind == "bar" and rng.random() < 0.7)
     down = turn[:, 0] if hooked else np.array([0.0, -1.0, 0.0])
     near = rng.uniform(0.0, _FARTHEST_M)
@@ -207,7 +198,7 @@ def _pinched(pinches: Pinches, held: tuple[Array, Array, Array, float], kind: st
     wanted[0], wanted[1] = _PRECISE, (0.3, 2.0, 0.6) if kind == "lateral" else _PRECISE
     if kind == "tripod":
         wanted[2] = _PRECISE
-        if rng.random() < 0.25:
+        if rng.random() < 0.4:
             wanted[3:] = _PRECISE
     needed = (0, 1, 2) if kind == "tripod" else (0, 1)
     return Proposal(kind, turn, place, wanted, needed, frame[:, 0], SIDES)
@@ -228,21 +219,12 @@ def _on_surface(tables: Tables, corners: Array, kind: str, rng: Generator) -> Pr
     ]
     reach = rng.uniform(0.065, 0.1) + (0.025 if kind == "above" else 0.0)
     at = np.array([reach, rng.uniform(-0.02, 0.015), knuckle[2] - palm - off])
-    row = {"above": _PRECISE, "palm": _AROUND, "flat": _FLAT}[kind]
+    row = {"above": _PRECISE, "palm": _POWER, "flat": _FLAT}[kind]
     wanted = np.array([row] * 5) * (1.0 if kind != "flat" else np.array([0.3, 1, 1, 1, 1])[:, None])
     flat = kind == "flat"
     downs = cone(turn[:, 2]) if flat else SIDES
     near = np.inf if flat else rng.uniform(0.0, _FARTHEST_M)
-    wanted = wanted if flat else _by_few(wanted, rng)
     return Proposal(kind, turn, point - turn @ at, wanted, () if flat else (0, 1, 2), -z, downs, near)
-
-
-def _by_few(wanted: Array, rng: Generator) -> Array:
-    """Without the little finger, or without it and the ring finger, or as it was."""
-    drawn = rng.random()
-    if drawn < 2.0 * _FEW:
-        wanted[3 if drawn < _FEW else 4 :] = 0.0
-    return wanted
 
 
 def cone(down: Array) -> Array:

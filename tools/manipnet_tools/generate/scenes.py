@@ -19,12 +19,12 @@ from manipnet.geometry import (
 )
 from manipnet_tools.assets.minimum_jerk import Move
 from manipnet_tools.generate.bank import Held, apart, of_side
-from manipnet_tools.generate.motions import Hold, Scene
+from manipnet_tools.generate.motions import Hold, Scene, Shift
 from manipnet_tools.generate.proposals import CONE_RAD
-from manipnet_tools.generate.shifts import HANDS_APART_M, drawn_shifts
 
 EVENTS: Final = ("lift", "hand over", "together", "near", "idle")
 _SHARES: Final = (0.36, 0.18, 0.34, 0.07, 0.05)
+_HANDS_APART_M: Final = 0.022
 _UP: Final = np.array([0.0, 1.0, 0.0])
 _TABLE_SHARE: Final = 0.75
 """How many takes have a table, through which no hand reaches for the object."""
@@ -84,7 +84,7 @@ class Director:
         self._carry(contact + 0.1, taken - 0.5, [first], lands=False)
         self._carry(release + 0.1, end - 0.1, [second], lands=True)
         done = self._hold("hand over", first, now, contact, release)
-        return max(done, self._hold("hand over", second, taken - rng.uniform(0.6, 1.0), taken, end, first))
+        return max(done, self._hold("hand over", second, taken - rng.uniform(0.6, 1.0), taken, end))
 
     def _together(self, now: float, sides: list[Side]) -> float:
         rng = self._rng
@@ -95,7 +95,7 @@ class Director:
         contact, lag = now + rng.uniform(0.6, 1.1), rng.uniform(0.0, 0.5)
         release = contact + lag + rng.uniform(1.5, 4.5)
         self._carry(contact + lag + 0.1, release - 0.1, [first, second], lands=True)
-        done = self._hold("together", first, now, contact, release, second)
+        done = self._hold("together", first, now, contact, release)
         return max(done, self._hold("together", second, now + lag, contact + lag, release - rng.uniform(0.0, 0.3)))
 
     def _press(self, now: float) -> float:
@@ -122,11 +122,7 @@ class Director:
         contact = now + rng.uniform(0.5, 1.0)
         return self._hold("near", grasp, now, contact, contact + rng.uniform(0.1, 0.8))
 
-    def _hold(
-        self, event: str, grasp: Held, reach: float, contact: float, release: float, beside: Held | None = None
-    ) -> float:
-        choice = self._grasps if event == "lift" or beside is not None else ()
-        shifts = () if event == "near" else drawn_shifts(choice, grasp, contact, release, beside, self._rng)
+    def _hold(self, event: str, grasp: Held, reach: float, contact: float, release: float) -> float:
         away = release + float(self._rng.uniform(0.5, 0.95))
         self._holds.append(
             Hold(
@@ -140,7 +136,7 @@ class Director:
                 grasp.opened,
                 grasp.back,
                 event == "near",
-                shifts,
+                () if event == "near" else self._shifts(grasp, contact, release),
             )
         )
         self.events.append(
@@ -153,6 +149,18 @@ class Director:
             }
         )
         return away
+
+    def _shifts(self, grasp: Held, contact: float, release: float) -> tuple[Shift, ...]:
+        """The wrist wanders about its grasp, and the fingers follow."""
+        rng, near = self._rng, [(grasp.pose, grasp.angles), *grasp.shifts]
+        shifts: list[Shift] = []
+        now = contact + float(rng.uniform(0.1, 0.6))
+        while len(near) > 1 and now < release - 0.5:
+            pose, angles = near[int(rng.integers(len(near)))]
+            end = min(now + float(rng.uniform(0.25, 0.8)), release - 0.1)
+            shifts.append(Shift(now, end, pose, angles))
+            now = end + float(rng.uniform(0.0, 0.8))
+        return tuple(shifts)
 
     def _reachable(self, side: Side) -> Held | None:
         """A grasp of the object as it is now, with the forearm on the person's side and above the table."""
@@ -173,7 +181,7 @@ class Director:
 
     def _beside(self, grasp: Held) -> Held | None:
         """A grasp of the other hand that leaves room for this one."""
-        others = [other for other in of_side(self._grasps, _OTHER[grasp.side]) if apart(grasp, other, HANDS_APART_M)]
+        others = [other for other in of_side(self._grasps, _OTHER[grasp.side]) if apart(grasp, other, _HANDS_APART_M)]
         return others[int(self._rng.integers(len(others)))] if others else None
 
     def _ease(self, grasp: Held, quat: Array) -> float:
