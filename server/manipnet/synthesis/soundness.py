@@ -8,7 +8,7 @@ from manipnet.jit import kernel
 
 @kernel
 def are_sound(numbers: Array, quaternions: np.ndarray, most: float, tolerance: float):
-    """Whether all `numbers (n,)` are finite and at most `most`, and all quaternions of unit length.
+    """Whether all `numbers (n,)` are finite and at most as large as `most`, and all quaternions of unit length.
 
     The places of the quaternions are `quaternions (m, 4)`; their squared lengths may differ from 1 by the `tolerance`.
     """

@@ -51,7 +51,7 @@ def _are_sound(message: HandsMessage, numbers: Array) -> bool:
 
     False as well where only `_check_numbers` can tell.
     """
-    # Sums of squares are bounds of each square; NaN is not below any bound.
+    # No square is larger than the sum of all. NaN fails every comparison.
     if not numbers @ numbers <= MAX_NUMBER**2:
         return False
     quats = numbers[quaternion_places(message)]
