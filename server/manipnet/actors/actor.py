@@ -27,8 +27,15 @@ class Actor:
     """A pair of hands, the props they may hold, and the stream of their bodies. Belongs to the tick thread."""
 
     def __init__(
-        self, config: ActorConfig, props: Sequence[Prop], bundle: Bundle, telemetry: Telemetry, look_ahead_s: float
+        self,
+        config: ActorConfig,
+        props: Sequence[Prop],
+        bundle: Bundle,
+        telemetry: Telemetry,
+        look_ahead_s: float,
+        start_delay_s: float = 0.0,
     ) -> None:
+        """`start_delay_s` is that of `Timeline`."""
         self.config = config
         self.props = list(props)
         self.seq = 0
@@ -45,7 +52,7 @@ class Actor:
             if f"{side}_wrist" in config.wrists
         }
         self._telemetry = telemetry
-        self._roles, self._timeline = BodyRoles(config), Timeline(look_ahead_s)
+        self._roles, self._timeline = BodyRoles(config), Timeline(look_ahead_s, start_delay_s=start_delay_s)
         self._timecodes = Timecodes()
         self._last: tuple[int, int] | None = None
         self._tracked: frozenset[str] = frozenset()

@@ -11,6 +11,7 @@ from manipnet import __version__
 from manipnet.actors.actor import Actor
 from manipnet.actors.avatar import Avatar
 from manipnet.actors.props import Prop
+from manipnet.actors.spread import start_delays_s
 from manipnet.config.settings import ActorConfig, ServerConfig
 from manipnet.control.actors_proxy import ActorsProxy
 from manipnet.control.body_gauges import body_gauges
@@ -57,7 +58,7 @@ class Session:
         with collection_paused():
             pose_a_hand(self.bundle, config.solver)
         wait_for_kernels()
-        self.actors = [self._load_actor(actor) for actor in config.actors]
+        self.actors = list(map(self._load_actor, config.actors, start_delays_s(config.actors)))
         profiles = {actor.name: read_profile(actor.hand) for actor in config.actors if actor.hand is not None}
         avatars = {actor: Avatar(profile, self.bundle.hand) for actor, profile in profiles.items()}
         self.given_avatars = {actor: profile.name for actor, profile in profiles.items()}
@@ -133,7 +134,7 @@ class Session:
                 metadata["rig"] = self.config.rig.read_text(encoding="utf-8-sig")
         return metadata, props
 
-    def _load_actor(self, config: ActorConfig) -> Actor:
+    def _load_actor(self, config: ActorConfig, start_delay_s: float) -> Actor:
         shapes = [(prop.name, self.catalog.load(prop.mesh, prop.unit, prop.scale)) for prop in config.objects]
         props = [Prop(name, shape.name, shape) for name, shape in shapes]
-        return Actor(config, props, self.bundle, self.telemetry, self.config.look_ahead_s)
+        return Actor(config, props, self.bundle, self.telemetry, self.config.look_ahead_s, start_delay_s)

@@ -43,7 +43,8 @@ class Forecast(Protocol):
 class PoseBuffer:
     """Poses of one body in the order of its sender's clock; samples may arrive late or in the wrong order."""
 
-    def __init__(self) -> None:
+    def __init__(self, turn: float = 0.0) -> None:
+        """The noise is estimated a share `turn` of `NOISE_EVERY_S` after the first sample, and then again and again."""
         self._times = np.empty(2 * KEEP)
         self._poses = np.empty((2 * KEEP, 7))
         self._count = 0
@@ -53,7 +54,7 @@ class PoseBuffer:
         """Instant of the newest tracked sample."""
         self.noise = UNKNOWN
         """The noise of the newest samples."""
-        self._estimated_s = -np.inf
+        self._turn, self._estimate_s = turn, -np.inf
 
     @property
     def times(self) -> Array:
@@ -68,11 +69,14 @@ class PoseBuffer:
     def add(self, t_s: float, pose: Array | Sequence[float]) -> bool:
         """Insert a tracked pose; returns False, and changes nothing, if there is one at nearly the same instant."""
         self._count, added = _insert(self._times, self._poses, self._count, t_s, np.asarray(pose, np.float64))
-        if added:
-            self.newest_s = max(self.newest_s, t_s)
-        if added and t_s - self._estimated_s >= NOISE_EVERY_S:
-            self._estimated_s, self.noise = t_s, estimate_noise(self.times, self.poses)
-        return added
+        if not added:
+            return False
+        if self._count == 1:
+            self._estimate_s = t_s + self._turn * NOISE_EVERY_S
+        self.newest_s = max(self.newest_s, t_s)
+        if t_s >= self._estimate_s:
+            self._estimate_s, self.noise = t_s + NOISE_EVERY_S, estimate_noise(self.times, self.poses)
+        return True
 
     def interval_s(self) -> float:
         """Median spacing of the newest samples; infinite before the second sample."""

@@ -12,14 +12,20 @@ from manipnet.tracking.tick import CURRENT_S, TICK_HZ, BodyHealth, Poses
 
 VANISHED_S: Final = 0.1
 """A tick waits no longer than this for one body while frames with others arrive."""
+TURN: Final = 0.618
+"""The noise of each body is estimated this share of the time between two estimates after the body before it, so that
+few are estimated at the same frame."""
 
 
 class Run:
-    """The frames of one run; tick `k` of it is the instant `t0_s + k / TICK_HZ`."""
+    """The frames of one run; tick `k` of it is the instant `t0_s + k / TICK_HZ`.
 
-    def __init__(self, number: int, t0_s: float, now_s: float) -> None:
-        self.number, self.t0_s = number, t0_s
-        self.arrivals = Arrivals(t0_s, now_s)
+    `t0_s` is the time of a frame: of the first one that comes `delay_s` after the run began, or later.
+    """
+
+    def __init__(self, number: int, t_s: float, now_s: float, delay_s: float = 0.0) -> None:
+        self.number, self.t0_s = number, t_s + delay_s
+        self.arrivals = Arrivals(t_s, now_s)
         self.tracks: dict[str, PoseBuffer] = {}
         self.next_index = 0
         """The next tick to show."""
@@ -28,12 +34,14 @@ class Run:
 
     def add(self, t_s: float, poses: Poses, now_s: float) -> int:
         """Take a frame, in which None stands for a body that is not tracked; returns the number of duplicate poses."""
+        if self.arrivals.newest_s < self.t0_s <= t_s and self.next_index == 0:
+            self.t0_s = t_s
         self.arrivals.note(t_s, now_s)
         duplicates = 0
         for name, pose in poses.items():
             track = self.tracks.get(name)
             if track is None:  # setdefault would allocate a buffer for every pose
-                track = self.tracks[name] = PoseBuffer()
+                track = self.tracks[name] = PoseBuffer(len(self.tracks) * TURN % 1.0)
             track.seen_s = max(track.seen_s, t_s)
             duplicates += pose is not None and not track.add(t_s, pose)
         return duplicates

@@ -1,9 +1,9 @@
 """Stream time: frames at any rate come in, and ticks at exactly 60 per second of the sender's time go out.
 
-Tick `k` of a run shows the instant `t0 + k/60`, where `t0` is the time of the run's first frame. It is synthesised from
-the window around that instant, so it falls due once samples up to it plus the look-ahead have arrived. In a silence our
-own clock carries stream time on, so ticks never stop. Our clock is always an argument; nothing here waits, sends or
-reads the time.
+Tick `k` of a run shows the instant `t0 + k/60`, where `t0` is the time of the run's first frame, or of one soon after
+it (`actors.spread`). It is synthesised from the window around that instant, so it falls due once samples up to it plus
+the look-ahead have arrived. In a silence our own clock carries stream time on, so ticks never stop. Our clock is always
+an argument; nothing here waits, sends or reads the time.
 
     EMPTY
       │ first frame
@@ -60,12 +60,18 @@ MAX_BACKLOG: Final = 120
 class Timeline:
     """Turns the frames of one actor into its ticks, however its senders behave."""
 
-    def __init__(self, look_ahead_s: float = MAX_LOOK_AHEAD_S, forecast: Forecast = damped_velocity) -> None:
+    def __init__(
+        self,
+        look_ahead_s: float = MAX_LOOK_AHEAD_S,
+        forecast: Forecast = damped_velocity,
+        start_delay_s: float = 0.0,
+    ) -> None:
+        """The first tick of each run is at the first frame `start_delay_s` after the run's first one, or later."""
         self.skipped_late = self.skipped_at_restart = 0
         """Ticks that were not shown: too many fell due at once, or a new run began before the old one played out."""
         self.restarts = 0
         """How often the sender's clock restarted."""
-        self._forecast = forecast
+        self._forecast, self._start_delay_s = forecast, start_delay_s
         self._run: Run | None = None
         self._ending: Run | None = None
         self._schedule = Schedule(look_ahead_s)
@@ -171,7 +177,7 @@ class Timeline:
             self._ending = self._ending or self._run
         self._jumps.forget()
         self._rewind.forget()
-        self._run = Run(number, t_s, now_s)
+        self._run = Run(number, t_s, now_s, self._start_delay_s)
         return self._run
 
     def _doubt(self, run: Run, frame: HeldFrame, source: str) -> str | None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from manipnet.actors.actor import Actor
 from manipnet.actors.props import Prop
+from manipnet.actors.spread import start_delays_s
 from manipnet.runtime.avatars import Avatars
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
@@ -77,11 +78,13 @@ class TickRunner:
         telemetry.stages = self.watch
         self._mailbox = Mailbox(telemetry)
         props = [Prop(name, shape.name, shape) for name, shape in scenario.shapes.items()]
+        configs = [actor_config(scenario, name, actors) for name in actor_names(actors)]
+        delays_s = start_delays_s(configs)
         self._loop = TickLoop(
             "bench",
             [
-                Actor(actor_config(scenario, name, actors), props, bundle, telemetry, MAX_LOOK_AHEAD_S)
-                for name in actor_names(actors)
+                Actor(config, props, bundle, telemetry, MAX_LOOK_AHEAD_S, delay_s)
+                for config, delay_s in zip(configs, delays_s, strict=True)
             ],
             self.synthesizer,
             self._publish,
