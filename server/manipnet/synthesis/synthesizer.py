@@ -183,13 +183,13 @@ class Synthesizer:
                 sense(hand, layout, shape, *inputs, first, last, batch.rays[part], batch.rows)
 
         def pose_part(part: int) -> None:
-            network = outputs, batch.angles, bundle.response, bundle.limits
+            network = batch.outputs, batch.angles, bundle.response, bundle.limits
             for shape, first, last in parts[part]:
                 self._pose(hand.packed, layout.output_starts, shape.solid, batch.windows, *network, first, last, poses)
 
         self._threads.run(sense_part, len(parts))
         self._on_stage("sense")
-        outputs = bundle.infer(batch.rows)
+        batch.infer()
         self._on_stage("infer")
         self._threads.run(pose_part, len(parts))
         steps = dict(zip(order, _steps(poses), strict=True))
@@ -206,6 +206,7 @@ class _Batch:
         self.rays = [rays_of(bundle.hand, count) for _ in range(part_count(count))]
         """For each part of the batch that is sensed by a thread of its own."""
         self.rows = np.empty((count, bundle.layout.input_size), np.float32)
+        self.infer, self.outputs = bundle.bind(self.rows)
 
     def put(self, n: int, scene: HandScene, state: HandState) -> None:
         """Make a hand number `n`."""

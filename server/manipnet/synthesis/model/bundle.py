@@ -7,8 +7,9 @@ hand, `CARD.md` is for people.
 import hashlib
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,7 +61,22 @@ class Bundle:
 
     def infer(self, rows: np.ndarray) -> np.ndarray:
         """Network outputs `(N, output_size)` of feature rows `(N, input_size)` float32, both in SI units."""
-        return np.asarray(self.session.run(None, {"features": rows})[0])
+        infer, outputs = self.bind(np.ascontiguousarray(rows, np.float32))
+        infer()
+        return outputs
+
+    def bind(self, rows: np.ndarray) -> tuple[Callable[[], object], np.ndarray]:
+        """A function that runs the network on what is then in `rows`, and the outputs that it fills, as in `infer`.
+
+        In a running server this takes a tenth less time than to pass the rows, which must be contiguous, at each tick.
+        """
+        outputs = np.empty((len(rows), self.layout.output_size), np.float32)
+        binding = self.session.io_binding()
+        binding.bind_cpu_input(self.session.get_inputs()[0].name, rows)
+        binding.bind_output(
+            self.session.get_outputs()[0].name, "cpu", 0, np.float32, outputs.shape, outputs.ctypes.data
+        )
+        return partial(self.session.run_with_iobinding, binding), outputs
 
 
 def load_bundle(model: Path | str = DEFAULT_MODEL, provider: Provider = "cpu") -> Bundle:
