@@ -117,7 +117,7 @@ class Actor:
         return tick
 
     def next_poll_s(self, now_s: float) -> float:
-        """When the next tick falls due if no frame arrives before; infinite before the first frame."""
+        """When the next tick falls due if no frame arrives before, as `Timeline.next_poll_s` has it."""
         return self._timeline.next_poll_s(now_s)
 
     def awaited(self) -> tuple[str, float] | None:

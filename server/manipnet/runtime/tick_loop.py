@@ -65,8 +65,7 @@ class TickLoop:
             now_s = time.monotonic()
             next_tick_s = min(actor.next_poll_s(now_s) for actor in self._actors)
             self.take_in(min(next_tick_s, next_second_s, now_s + MAX_WAIT_S) - now_s)
-            while self.step(time.monotonic()):
-                self.take_in(0.0)
+            self.step(time.monotonic())
             if time.monotonic() >= next_second_s:
                 next_second_s += 1.0
                 if self._avatars is not None:

@@ -129,10 +129,17 @@ class Timeline:
         return self._take(run, reached_s, now_s)
 
     def next_poll_s(self, now_s: float) -> float:
-        """Our clock when the next tick falls due if no frame arrives before; infinite before the first frame."""
-        if self._run is None:
+        """Our clock when the next tick falls due if no frame arrives before: now if it is due already.
+
+        Infinite before the first frame.
+        """
+        run, ending = self._run, self._ending
+        if run is None:
             return np.inf
-        return max(self._schedule.next_poll_s(self._ending or self._run, self._ending is not None), now_s)
+        if ending is not None:
+            return max(self._schedule.next_poll_s(ending, True), now_s)
+        is_due = self._schedule.due_s(run, run.next_index) <= self._schedule.reached_s(run, now_s) + TIME_TOLERANCE_S
+        return now_s if is_due else max(self._schedule.next_poll_s(run, False), now_s)
 
     def awaited(self) -> tuple[str, float] | None:
         """The sender whose clock is the stream's, and the time of the frame that lets the next tick fall due.
