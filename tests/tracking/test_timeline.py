@@ -122,6 +122,29 @@ def test_jitter_reordering_and_sign_flips_change_nothing(gaps_s: list[float], or
     assert same_pose(tick.bodies["body"].window[inside], screw(instants[inside]), 1e-6)
 
 
+@pytest.mark.parametrize(("rate_hz", "first_s"), [(60.0, 1 / 60), (100.0, 0.01), (120.0, 1 / 120), (360.0, 1 / 120)])
+@pytest.mark.parametrize("look_ahead_s", [0.0, 0.1])
+def test_ticks_that_begin_later_are_as_even_and_none_is_missing(
+    rate_hz: float, first_s: float, look_ahead_s: float
+) -> None:
+    timeline = Timeline(look_ahead_s, start_delay_s=0.4 * TICK_S)
+    ticks = stream(timeline, np.arange(rate_hz) / rate_hz)
+    assert np.allclose([tick.time_s for tick in ticks], first_s + np.arange(len(ticks)) / 60)
+    assert len(ticks) == pytest.approx((1.0 - look_ahead_s) * 60, abs=1.5)
+    assert not any(tick.silent for tick in ticks)
+    restarted = stream(timeline, 1e4 + np.arange(rate_hz) / rate_hz, start_s=101.0 - 1e4)
+    own = [tick for tick in restarted if tick.run == 1]
+    assert np.allclose([tick.time_s for tick in own], 1e4 + first_s + np.arange(len(own)) / 60)
+
+
+def test_a_stream_of_a_single_frame_ticks_by_our_clock_after_a_delay_as_well() -> None:
+    timeline = Timeline(0.0, start_delay_s=0.4 * TICK_S)
+    ticks = stream(timeline, [0.0]) + carry_on(timeline, 100.0, 100.2)
+    ticks += stream(timeline, np.arange(0.2, 0.4, 1 / 120))
+    assert [tick.index for tick in ticks] == list(range(len(ticks)))
+    assert np.allclose([tick.time_s for tick in ticks], 0.4 * TICK_S + np.arange(len(ticks)) / 60)
+
+
 def test_a_rate_change_is_followed() -> None:
     times = np.concatenate([np.arange(0, 1, 1 / 30), np.arange(1, 2, 1 / 360), np.arange(2, 3, 1 / 60)])
     timeline = Timeline()

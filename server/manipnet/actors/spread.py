@@ -9,8 +9,8 @@ from manipnet.tracking.tick import TICK_S
 MANY: Final = 12
 """With fewer actors all tick at once, because every batch costs something of its own."""
 LATER_S: Final = 0.4 * TICK_S
-"""The later ticks begin at the first frame this much after the first one: half an interval later with 120 frames a second,
-and at once with 60, where nothing arrives in between."""
+"""The later ticks begin at the first frame this much after the first one: half an interval later with 120 frames a
+second, and with those of all others at 60, where nothing arrives in between."""
 
 
 def start_delays_s(actors: Sequence[ActorConfig]) -> list[float]:

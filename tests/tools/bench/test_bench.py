@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from manipnet.actors.spread import MANY
 from manipnet.inputs.sender_stats import SenderStats
 from manipnet.synthesis.model.bundle import load_bundle
 from manipnet.synthesis.objects.repair import is_closed
@@ -54,6 +55,17 @@ def test_the_stages_sum_to_the_whole_tick(tiny_bundle: Path) -> None:
     assert len(result.reference) == 5 * TURN
     scenes, states = runners["two"].synthesizer.inputs
     assert len(scenes) == len(states) == 4
+    assert len(result.waits["two"]) == 5 * TURN
+    assert (result.waits["two"] >= result.total("two")).all()
+
+
+def test_a_tick_of_many_actors_is_that_of_all_their_batches(tiny_bundle: Path) -> None:
+    runner = TickRunner(load_bundle(tiny_bundle), demo(120.0), MANY)
+    spent_s = runner.tick()
+    scenes, _ = runner.synthesizer.inputs
+    assert len(scenes) == MANY  # two hands of half of the actors
+    assert len(runner.waits_s) == 2
+    assert max(runner.waits_s) < sum(spent_s.values()) <= sum(runner.waits_s) + 1e-9
 
 
 def test_the_command_measures_and_writes_the_figures(

@@ -79,12 +79,17 @@ class TickRunner:
         self._mailbox = Mailbox(telemetry)
         props = [Prop(name, shape.name, shape) for name, shape in scenario.shapes.items()]
         configs = [actor_config(scenario, name, actors) for name in actor_names(actors)]
-        delays_s = start_delays_s(configs)
+        self._actors, self._published = actors, 0
+        self.waits_s: list[float] = []
+        """For each batch of the latest tick, how long its hands would have taken in real time, from when they fell due:
+        the whole batch, and what was left of the batch before it."""
+        self._free_s = 0.0
+        """Stream time at which the loop would have been ready for the next batch."""
         self._loop = TickLoop(
             "bench",
             [
                 Actor(config, props, bundle, telemetry, MAX_LOOK_AHEAD_S, delay_s)
-                for config, delay_s in zip(configs, delays_s, strict=True)
+                for config, delay_s in zip(configs, start_delays_s(configs), strict=True)
             ],
             self.synthesizer,
             self._publish,
@@ -97,10 +102,23 @@ class TickRunner:
             self.tick()
 
     def tick(self) -> dict[str, float]:
-        """Feed frames until a tick is due, and run it. Returns the duration of each stage in seconds."""
+        """Feed frames until every actor has ticked. Returns the duration of each stage in seconds.
+
+        Many actors tick in several batches at different instants, whose durations are added up.
+        """
+        spent_s, self.waits_s, self._published = dict.fromkeys(STAGES, 0.0), [], 0
+        while self._published < self._actors:
+            for stage, seconds in self._batch().items():
+                spent_s[stage] += seconds
+        return spent_s
+
+    def _batch(self) -> dict[str, float]:
+        """Feed frames until a tick is due, and run it."""
         while True:
             self.watch.start()
             if self._loop.step(self._now_s):
+                self._free_s = max(self._free_s, self._now_s) + sum(self.watch.spent_s.values())
+                self.waits_s.append(self._free_s - self._now_s)
                 return self.watch.spent_s
             frame = next(self._frames)
             self._now_s = frame.t_s
@@ -112,13 +130,16 @@ class TickRunner:
         encode_msgpack(message)
         encode_binary(message)
         self.watch.ended("encode")
+        self._published += 1
 
 
 @dataclass(frozen=True)
 class Race:
-    """Durations in seconds: `stages[runner][stage] (n,)` of every tick, and `(n,)` of every pass of the reference."""
+    """Durations in seconds: `stages[runner][stage] (n,)` of every tick, `(n,)` of every pass of the reference, and
+    `waits[runner] (m,)` from when the hands of each batch fell due until they were encoded."""
 
     stages: Mapping[str, Mapping[str, np.ndarray]]
+    waits: Mapping[str, np.ndarray]
     reference: np.ndarray
 
     def total(self, name: str) -> np.ndarray:
@@ -138,6 +159,7 @@ def race(
     So all meet the same disturbances, and each mostly finds its own data in the processor's caches.
     """
     ticks: dict[str, list[dict[str, float]]] = {name: [] for name in runners}
+    waits: dict[str, list[float]] = {name: [] for name in runners}
     passes: list[float] = []
     gc.collect()
     gc.freeze()
@@ -148,13 +170,15 @@ def race(
             reference()
             passes.append(time.perf_counter() - start_s)
         for name, runner in runners.items():
-            ticks[name] += [runner.tick() for _ in range(TURN)]
+            for _ in range(TURN):
+                ticks[name].append(runner.tick())
+                waits[name] += runner.waits_s
     gc.unfreeze()
     stages = {
         name: {stage: np.array([tick[stage] for tick in of_runner]) for stage in STAGES}
         for name, of_runner in ticks.items()
     }
-    return Race(stages, np.array(passes))
+    return Race(stages, {name: np.array(of_runner) for name, of_runner in waits.items()}, np.array(passes))
 
 
 @dataclass(frozen=True)

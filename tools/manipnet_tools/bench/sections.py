@@ -116,10 +116,13 @@ def triangles(bench: Bench) -> Figures:
 
 
 def actors(bench: Bench) -> Figures:
-    """The tick of 1 to 16 actors, whose hands are synthesised in one batch."""
+    """The tick of 1 to 16 actors, and how long their hands take from when they fall due.
+
+    All hands are synthesised in one batch, or in two at different instants if there are many actors.
+    """
     runners = {str(count): TickRunner(bench.bundle, bench.scenario, count) for count in ACTORS}
     result = race(runners, bench.reference, 0.2 * bench.seconds)
-    return {name: _raced(result, name) for name in runners}
+    return {name: _raced(result, name) | {"wait": percentiles(result.waits[name])} for name in runners}
 
 
 def intake(bench: Bench) -> Figures:
