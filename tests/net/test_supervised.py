@@ -96,10 +96,10 @@ def test_a_receiver_that_is_down_is_reported_until_it_listens_again(heard, telem
     wait_for(take_port)
     wait_for(lambda: "in use" in (telemetry.receivers()["zmq"]["error"] or ""))
     assert status([], telemetry, 0.0)["receivers"]["zmq"]["state"] == "down"
-    assert SecondLines([], telemetry).next().status.startswith("ZMQ IS DOWN | ")
+    assert SecondLines([], telemetry).next(0.0).status.startswith("ZMQ IS DOWN | ")
     taken.close()
     wait_for(lambda: telemetry.receivers()["zmq"]["state"] == "listening")
-    assert "DOWN" not in SecondLines([], telemetry).next().status
+    assert "DOWN" not in SecondLines([], telemetry).next(0.0).status
     send_body(receiver.address)
     assert heard.next().t_s == 1.0
     receiver.stop()

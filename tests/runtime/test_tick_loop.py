@@ -16,7 +16,8 @@ from manipnet.geometry import quat_exp
 from manipnet.runtime.flight_recorder import FlightRecorder
 from manipnet.runtime.mailbox import Mailbox
 from manipnet.runtime.object_catalog import ObjectCatalog
-from manipnet.runtime.tick_loop import TickLoop
+from manipnet.runtime.status import SecondLines
+from manipnet.runtime.tick_loop import TickLoop, second_after
 from manipnet.synthesis.model.bundle import Bundle, load_bundle
 from manipnet.synthesis.objects.library import LIBRARY_FOLDER
 from manipnet.synthesis.synthesizer import HandStep, Synthesizer
@@ -247,6 +248,20 @@ def test_the_loop_goes_on_if_a_second_cannot_be_reported(bench: Bench, caplog) -
     bench.loop.run(lambda: len(seconds) == 2, report)
     assert seconds[1] - seconds[0] > 0.5
     assert "cannot be reported" in caplog.text
+
+
+def test_the_line_of_a_second_counts_the_first_hands_and_then_tells_their_rate(bench: Bench) -> None:
+    lines = SecondLines(bench.actors, bench.telemetry)
+    assert lines.next(10.0).status.startswith("waiting for bodies")
+    bench.play(1.0)
+    assert lines.next(11.0).status.startswith("30 hands so far | left")
+    bench.play(1.0, start_s=1.0)
+    assert lines.next(12.5).status.startswith("40 hands/s | delay ")
+
+
+@pytest.mark.parametrize(("now_s", "next_s"), [(5.0, 6.0), (5.002, 6.0), (5.999, 6.0), (8.3, 9.0)])
+def test_seconds_that_pass_during_a_long_tick_are_not_reported_afterwards(now_s: float, next_s: float) -> None:
+    assert second_after(now_s, 5.0) == pytest.approx(next_s)
 
 
 def test_a_hand_smaller_than_the_models_sees_a_larger_world(bundle, catalog) -> None:

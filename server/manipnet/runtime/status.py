@@ -33,27 +33,33 @@ class SecondLines:
 
     def __init__(self, actors: Sequence[Actor], telemetry: Telemetry) -> None:
         self._actors, self._telemetry = actors, telemetry
-        self._messages = 0
+        self._messages, self._since_s = 0, -math.inf
+        """How many messages there were at the last call, and when it was."""
         self._reported: dict[str, str] | None = None
         self._before: dict[str, str] = {}
 
-    def next(self) -> Second:
-        """The rate, the delay, both hands of each actor, and what is down; call this once per second.
+    def next(self, now_s: float) -> Second:
+        """The rate and the delay since the last call, both hands of each actor, and what is down.
+
+        Call this about once per second, with the time. The first hands are counted, and have no rate yet.
 
         A hand whose state flickers is not a change until the state has lasted for a second.
         """
         down = [f"{name.upper()} IS DOWN" for name in down_receivers(self._telemetry)]
-        return Second(" | ".join([*down, self._describe()]), self._changes())
+        return Second(" | ".join([*down, *self._describe(now_s)]), self._changes())
 
-    def _describe(self) -> str:
-        messages = sum(actor.seq for actor in self._actors)
-        rate_hz, self._messages = messages - self._messages, messages
-        if not self._is_receiving():
-            return WAITING
+    def _describe(self, now_s: float) -> list[str]:
+        before, passed_s = self._messages, now_s - self._since_s
+        self._messages, self._since_s = sum(actor.seq for actor in self._actors), now_s
         p50_s = self._telemetry.timings.recent("total", 50)[0]
-        look_ahead_s = max(actor.look_ahead_s for actor in self._actors)
+        if not self._is_receiving():
+            return [WAITING]
         hands = [f"{self._name(actor)}{', '.join(map(_hand, actor.hands.values()))}" for actor in self._actors]
-        return " | ".join([f"{rate_hz:.0f} hands/s", f"delay {1e3 * (look_ahead_s + p50_s):.0f} ms", *hands])
+        if before == 0:
+            return [f"{self._messages} hands so far", *hands]
+        look_ahead_s = max(actor.look_ahead_s for actor in self._actors)
+        rate_hz = (self._messages - before) / passed_s
+        return [f"{rate_hz:.0f} hands/s", f"delay {1e3 * (look_ahead_s + p50_s):.0f} ms", *hands]
 
     def _changes(self) -> tuple[str, ...]:
         now = self._state()

@@ -5,6 +5,7 @@ It is the only thread that touches the actors, and it never waits for a client, 
 """
 
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Protocol
@@ -66,12 +67,13 @@ class TickLoop:
             next_tick_s = min(actor.next_poll_s(now_s) for actor in self._actors)
             self.take_in(min(next_tick_s, next_second_s, now_s + MAX_WAIT_S) - now_s)
             self.step(time.monotonic())
-            if time.monotonic() >= next_second_s:
-                next_second_s += 1.0
+            now_s = time.monotonic()
+            if now_s >= next_second_s:
+                next_second_s = second_after(now_s, next_second_s)
                 if self._avatars is not None:
                     self._avatars.forget_unwanted()
                 try:
-                    every_second(time.monotonic())
+                    every_second(now_s)
                 except Exception:
                     _log.exception("the state of this second cannot be reported")
 
@@ -132,3 +134,8 @@ class TickLoop:
             except Exception as error:
                 self._errors.report("show", error, plan.tick)
         return actor.hold(plan.tick)
+
+
+def second_after(now_s: float, deadline_s: float) -> float:
+    """The first deadline to come of those one second apart; the ones that passed in a long tick are left out."""
+    return deadline_s + 1.0 + math.floor(now_s - deadline_s)

@@ -98,7 +98,7 @@ class Server:
         return Demo()
 
     def _every_second(self, now_s: float) -> None:
-        second, recording = self._seconds.next(), self._recordings.next()
+        second, recording = self._seconds.next(now_s), self._recordings.next()
         for change in (*second.changes, *recording.changes):
             self._say(change)
         self._show(" | ".join(filter(None, (recording.status, second.status))))
