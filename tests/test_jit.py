@@ -1,5 +1,9 @@
 """The working memory of compiled functions, which neither allocate nor count references."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 from compiled import call
 from numba import types
@@ -35,3 +39,12 @@ def test_arrays_on_the_stack_are_arrays_of_their_shape_and_do_not_overlap() -> N
 def test_nothing_allocates_or_counts_references() -> None:
     call(_fill_and_sum, np.zeros((3, 3)), np.zeros(4))
     assert all("NRT_" not in text for text in _fill_and_sum.inspect_llvm().values())
+
+
+def test_numba_keeps_the_target_even_if_it_was_imported_before_the_kernels() -> None:
+    chosen = "import numba, manipnet.jit; from numba.core import config; print(config.CPU_NAME, config.CPU_FEATURES)"
+    script = f"{chosen}; config.reload_config(); print(config.CPU_NAME, config.CPU_FEATURES)"
+    without = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_DISABLE_ERROR")}
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=without)
+    before, after = ran.stdout.splitlines()
+    assert before == after

@@ -23,6 +23,8 @@ def choose_target() -> str:
 
     `NUMBA_CPU_NAME` in the environment takes precedence.
     """
+    # numba would read a changed environment again when it first compiles, and forget what is chosen here
+    config.reload_config()
     if config.CPU_NAME:  # pyright: ignore[reportAttributeAccessIssue]: set at run time
         return f"{config.CPU_NAME} {config.CPU_FEATURES}"  # pyright: ignore[reportAttributeAccessIssue]
     features = llvm.get_host_cpu_features()
