@@ -22,7 +22,6 @@ from manipnet.recording.take_notes import TakeNotes
 from manipnet.recording.trigger_listener import TriggerListener
 from manipnet.recording.triggered import TriggeredRecordings
 from manipnet.runtime.mesh_watch import MeshWatch
-from manipnet.runtime.prometheus import MetricsPage
 from manipnet.runtime.tick_loop import TickLoop
 from manipnet.server.session import Session
 from manipnet.synthesis.hand.hand_file import HAND_FILE
@@ -92,6 +91,8 @@ def open_services(session: Session, keys: ServerKeys | None, opened: ExitStack) 
         opened.callback(listener.close)
         addresses["trigger"] = listener.address
     if config.metrics_port is not None:
+        from manipnet.runtime.prometheus import MetricsPage  # its library is of no use to others
+
         metrics = MetricsPage(LOOPBACK, config.metrics_port, telemetry)
         opened.callback(metrics.close)
         addresses["metrics"] = metrics.address
