@@ -163,7 +163,8 @@ class ManipNet(nn.Module):
 
     def forward(self, features: torch.Tensor) -> torch.Tensor:
         """Features `(N, input_size)` to outputs `(N, output_size)`."""
-        return self.normalised(features) * self.output_std + self.output_mean + self._base_pose(features)
+        outputs = self.normalised(features) * self.output_std + self.output_mean
+        return outputs + self._base_pose(features) if self.predicts_change else outputs  # adding zero costs five nodes
 
     def _base_pose(self, features: torch.Tensor) -> torch.Tensor:
         """The pose to which a predicted change is added; zero for a model that predicts the pose itself."""
