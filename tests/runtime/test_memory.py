@@ -53,7 +53,7 @@ import sys
 from manipnet.runtime.memory import leave_out_linear_algebra
 leave_out_linear_algebra()
 import numpy as np
-from manipnet.synthesis.soundness import are_sound
+from manipnet.actors.soundness import are_sound
 assert are_sound(np.ones(4), np.array([[0, 1, 2, 3]]), 1.0, 3.0)
 assert "scipy.linalg" not in sys.modules, "a kernel has loaded it"
 import scipy.linalg

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from manipnet.actors.actor import Actor
+from manipnet.actors.soundness import are_sound
 from manipnet.actors.transitions import HOLD_AFTER_S, ShownHand
 from manipnet.geometry import Array
 from manipnet.synthesis.hand.hand import Hand
 from manipnet.synthesis.hand.openxr import place_in_world
-from manipnet.synthesis.soundness import are_sound
 from manipnet.tracking.tick import Tick
 from manipnet.wire import BodyPose, HandPose, HandsMessage, Latency, Side
 from manipnet.wire.numbers import (

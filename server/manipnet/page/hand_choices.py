@@ -73,7 +73,8 @@ class HandChoices:
         with tempfile.TemporaryDirectory(prefix="manipnet-") as folder:
             file, made = Path(folder) / Path(name).name, Path(folder) / "hand.json"
             file.write_bytes(content)
-            command = [sys.executable, "-m", "manipnet_tools.cli", "hand", "import", str(file), "--out", str(made)]
+            command = [sys.executable, "-m", "manipnet_tools.cli", "hand", "import", str(file), "--no-picture"]
+            command += ["--out", str(made)]
             try:
                 done = subprocess.run(command, capture_output=True, text=True, timeout=IMPORT_S, check=False)
             except subprocess.TimeoutExpired:

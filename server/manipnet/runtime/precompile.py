@@ -26,6 +26,7 @@ def compile_aside() -> None:
     """Compile all kernels of a start and of a tick except the solver's, by using each of them."""
     import numpy as np
 
+    from manipnet.actors.soundness import are_sound
     from manipnet.runtime.warm_up import carry_a_hand
     from manipnet.synthesis.hand.kinematics import forward_kinematics
     from manipnet.synthesis.hand.limits import keep_angles
@@ -34,7 +35,6 @@ def compile_aside() -> None:
     from manipnet.synthesis.model.shipped import shipped_hand
     from manipnet.synthesis.objects.distance_field import build_field
     from manipnet.synthesis.objects.shape import load_shape
-    from manipnet.synthesis.soundness import are_sound
     from manipnet.synthesis.synthesizer import HandScene, windows_of
     from manipnet.tracking.forecast import damped_velocity
     from manipnet.tracking.outlier_gate import OutlierGate

@@ -223,3 +223,11 @@ def test_the_command_writes_a_profile_and_a_picture(tmp_path, capsys):
     assert "hand bone LeftHand" in capsys.readouterr().out
     assert main(["hand", "show", str(tmp_path / "absent.json"), "--out", str(tmp_path / "x.png")]) == 1
     assert "cannot be read" in capsys.readouterr().err
+
+
+def test_the_command_leaves_the_picture_out(tmp_path):
+    file, out = write_glb(tmp_path / "a.glb", rig()), tmp_path / "hand.json"
+    out.with_suffix(".png").write_bytes(b"another one's")
+    assert main(["hand", "import", str(file), "--no-picture", "--out", str(out)]) == 0
+    assert read_profile(out).name == "a"
+    assert out.with_suffix(".png").read_bytes() == b"another one's"

@@ -43,6 +43,7 @@ def build_parser() -> Parser:
     take_in.add_argument("--map", type=Path, metavar="FILE", help="JSON file that says which bone is which joint")
     take_in.add_argument("--name", help="name of the profile (default: that of the avatar's file)")
     take_in.add_argument("--out", type=Path, required=True, metavar="HAND.json", help="the file to write")
+    take_in.add_argument("--no-picture", action="store_true", help="write the profile alone, which is much faster")
     take_in.add_argument("--force", action="store_true", help=FORCE)
     take_in.set_defaults(do=_import)
     show = verbs.add_parser("show", help="draw a profile")
@@ -64,7 +65,7 @@ def _import(options: argparse.Namespace) -> None:
     require_file(options.avatar)
     require_file(options.map)
     picture = options.out.with_suffix(".png")
-    for file in (options.out, picture):
+    for file in (options.out,) if options.no_picture else (options.out, picture):
         require_new(file, options.force)
     from manipnet.synthesis.hand.profile import profile_to_json
     from manipnet.synthesis.model.shipped import shipped_hand
@@ -74,7 +75,8 @@ def _import(options: argparse.Namespace) -> None:
     profile = import_profile(options.avatar, name, shipped_hand(), print, options.map)
     options.out.write_text(profile_to_json(profile), encoding="utf-8")
     print(f"wrote {options.out}")
-    _draw(options.out, picture)
+    if not options.no_picture:
+        _draw(options.out, picture)
 
 
 def _show(options: argparse.Namespace) -> None:
