@@ -88,7 +88,7 @@ matrix, vector = stack_array(3, 3), stack_array(3)
 
 _log = logging.getLogger(__name__)
 
-COMPILED = ("geometry.py", "synthesis", "tracking")
+COMPILED = ("geometry.py", "synthesis", "tracking", "actors/soundness.py")
 """Where compiled functions are, and the constants that are compiled into them; nothing else is part of the state."""
 
 _KEEP_S = 7 * 86400.0
