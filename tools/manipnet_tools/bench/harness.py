@@ -106,7 +106,8 @@ class TickRunner:
 
         Many actors tick in several batches at different instants, whose durations are added up.
         """
-        spent_s, self.waits_s, self._published = dict.fromkeys(STAGES, 0.0), [], 0
+        spent_s: dict[str, float] = dict.fromkeys(STAGES, 0.0)
+        self.waits_s, self._published = [], 0
         while self._published < self._actors:
             for stage, seconds in self._batch().items():
                 spent_s[stage] += seconds
