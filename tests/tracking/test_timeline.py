@@ -137,6 +137,17 @@ def test_ticks_that_begin_later_are_as_even_and_none_is_missing(
     assert np.allclose([tick.time_s for tick in own], 1e4 + first_s + np.arange(len(own)) / 60)
 
 
+def test_a_tick_that_is_due_already_is_to_be_polled_now() -> None:
+    timeline = Timeline(0.1)
+    for k in range(24):
+        timeline.push(k / 120, {"body": screw(k / 120)}, k / 120)
+    now_s = 23 / 120
+    while timeline.next_poll_s(now_s) == now_s:
+        assert timeline.poll(now_s) is not None
+    assert timeline.poll(now_s) is None
+    assert now_s < timeline.next_poll_s(now_s) < now_s + SILENCE_S + TICK_S
+
+
 def test_a_stream_of_a_single_frame_ticks_by_our_clock_after_a_delay_as_well() -> None:
     timeline = Timeline(0.0, start_delay_s=0.4 * TICK_S)
     ticks = stream(timeline, [0.0]) + carry_on(timeline, 100.0, 100.2)

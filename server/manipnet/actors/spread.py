@@ -16,7 +16,8 @@ second, and with those of all others at 60, where nothing arrives in between."""
 def start_delays_s(actors: Sequence[ActorConfig]) -> list[float]:
     """How long after its first frame each actor begins to tick: half of many actors later than the others.
 
-    Actors that share a body stay together, because hands that hold the same object are solved together.
+    Actors that share a body stay together, because hands that hold the same object at the same instant are solved
+    together. Whatever requests change later leaves the delays as they are.
     """
     later: set[int] = set()
     if len(actors) >= MANY:
