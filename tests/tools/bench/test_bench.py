@@ -16,8 +16,9 @@ from manipnet.wire.bodies import BodyFrame
 from manipnet_tools import cli
 from manipnet_tools.bench.harness import STAGES, TICK, TURN, TickRunner, race
 from manipnet_tools.bench.intake import BONES, CHUNK, Case, cases, frame_of, time_cases
+from manipnet_tools.bench.machine import this_machine
 from manipnet_tools.bench.quick import Quick, verdict
-from manipnet_tools.bench.report import verdicts, with_ratios
+from manipnet_tools.bench.report import lines, verdicts, with_ratios
 from manipnet_tools.bench.scenarios import demo, endless
 from manipnet_tools.bench.shapes import gourd
 
@@ -88,6 +89,17 @@ def test_the_command_measures_and_writes_the_figures(
     printed = capsys.readouterr().out
     assert "published interval: p99" in printed
     assert figures["machine"]["processor"] in printed
+
+
+def test_a_report_has_every_section_of_races() -> None:
+    times = {"p50": 0.5, "p99": 0.75, "p50_ms": 1.5, "p99_ms": 2.5}
+    raced = {stage: times for stage in (*STAGES, "total")}
+    models = {"single": raced, "quantised": raced, "weights": "random", "quantised_apart_mm": 0.04}
+    actors = {"1": raced | {"wait": times | {"p99_ms": 3.125}}}
+    text = "\n".join(lines({"models": models, "actors": actors}, this_machine(), "tiny"))
+    assert "quantised: random weights; random ones put joints at most 0.04 mm apart" in text
+    assert text.count("due to out: p50") == 1
+    assert "3.125" in text
 
 
 def test_a_plain_installation_gets_a_verdict_in_a_sentence(

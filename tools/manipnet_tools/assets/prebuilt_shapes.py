@@ -25,7 +25,7 @@ def main() -> None:
             write_cached_mesh(Path(made) / str(mesh_cache_name(LIBRARY_FOLDER / f"{name}.ply", "m", 1.0)), mesh)
             if name in DEMO_OBJECTS:
                 build_shape(mesh, Path(made))
-        for file in sorted(Path(made).glob("*.npz")):
+        for file in sorted(Path(made).iterdir()):
             path = PREBUILT_FOLDER / file.name
             with np.load(file, allow_pickle=False) as arrays:
                 np.savez_compressed(path, allow_pickle=False, **arrays)

@@ -27,16 +27,16 @@ def run(options: BenchOptions) -> None:
         seconds = options.seconds or QUICK_S
         print(f"measuring for {seconds:g} s …", file=sys.stderr, flush=True)
         measured = quick.measure(bundle, scenario, seconds)
-        print("\n".join(quick.lines(measured, machine, about)))
-        figures: dict[str, Any] = {"quick": measured.figures()}
+        report, figures = quick.lines(measured, machine, about), {"quick": measured.figures()}
     else:
         from manipnet_tools.bench.report import lines
 
         figures = _sections(options, bundle, scenario)
-        print("\n".join(lines(figures, machine, about)))
-    if options.json is not None:
+        report = lines(figures, machine, about)
+    if options.json is not None:  # before the report, so that figures that took minutes are kept whatever happens
         content = {"machine": asdict(machine), "model": bundle.name, "performance": scenario.name} | figures
         options.json.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    print("\n".join(report))
 
 
 def _sections(options: BenchOptions, bundle: Bundle, scenario: Scenario) -> dict[str, Any]:

@@ -120,17 +120,17 @@ def _totals(title: str, section: Figures) -> Iterator[str]:
     if "skipped" in section:
         yield f"\n{title}: {section['skipped']}"
         return
-    waits = any("wait" in figures for figures in section.values())
+    raced = {name: figures for name, figures in section.items() if isinstance(figures, dict)}
+    waits = any("wait" in figures for figures in raced.values())
     head = f"\n{title:12} {'p50 ms':>8} {'p99':>8}   {'p50 / ref':>9} {'p99 / ref':>9}   " + "  ".join(_SHOWN)
     yield head + ("     due to out: p50 ms  p99" if waits else "")
-    for name, figures in section.items():
-        if isinstance(figures, dict):
-            total, stages = figures["total"], " ".join(f"{figures[s]['p50']:6.3f}" for s in _SHOWN)
-            wait = f"{figures['wait']['p50_ms']:19.3f} {figures['wait']['p99_ms']:8.3f}" if waits else ""
-            yield (
-                f"{name:12} {total['p50_ms']:8.3f} {total['p99_ms']:8.3f}   "
-                f"{total['p50']:9.3f} {total['p99']:9.3f}   {stages}{wait}"
-            )
+    for name, figures in raced.items():
+        total, stages = figures["total"], " ".join(f"{figures[s]['p50']:6.3f}" for s in _SHOWN)
+        wait = f"{figures['wait']['p50_ms']:19.3f} {figures['wait']['p99_ms']:8.3f}" if waits else ""
+        yield (
+            f"{name:12} {total['p50_ms']:8.3f} {total['p99_ms']:8.3f}   "
+            f"{total['p50']:9.3f} {total['p99']:9.3f}   {stages}{wait}"
+        )
     if "weights" in section:
         apart_mm = section["quantised_apart_mm"]
         yield f"quantised: {section['weights']} weights; random ones put joints at most {apart_mm:.2f} mm apart"

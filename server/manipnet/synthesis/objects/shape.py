@@ -24,7 +24,7 @@ from manipnet.synthesis.objects.mass import mass_of
 from manipnet.synthesis.objects.mesh import ClosedMesh, load_mesh
 from manipnet.synthesis.objects.mesh_cache import mesh_cache_name, read_cached_mesh, write_cached_mesh
 from manipnet.synthesis.objects.rays import RayScene, ray_scene
-from manipnet.synthesis.objects.shape_cache import in_file, read_cached, write_cached
+from manipnet.synthesis.objects.shape_cache import read_cached, write_cached
 from manipnet.synthesis.objects.simplify import FEWER_TRIANGLES, MOST_TRIANGLES, simplified
 
 _CACHE_VERSION = f"1-{RESOLUTION}"
@@ -158,8 +158,7 @@ def build_shape(mesh: ClosedMesh, cache_dir: Path | None = None) -> Shape:
         bvh = build_bvh(sensed.vertices, sensed.faces)
         parts = bvh, build_field(bvh)
         write_cached(path, *parts)
-    bvh, field = parts
-    return Shape(mesh, bvh, in_file(path.with_suffix(".npy"), field), *mass_of(mesh.vertices, mesh.faces))
+    return Shape(mesh, *parts, *mass_of(mesh.vertices, mesh.faces))
 
 
 def _cache_folder() -> Path:

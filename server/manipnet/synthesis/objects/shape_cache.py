@@ -15,7 +15,7 @@ from manipnet.common.atomic_file import replacing
 from manipnet.synthesis.objects.bvh import Bvh
 from manipnet.synthesis.objects.distance_field import Field
 
-MAX_FOLDER_BYTES: Final = 1024 << 20
+MAX_FOLDER_BYTES: Final = 512 << 20
 """The files of a folder that were used longest ago are deleted beyond this size, which is that of some 90 shapes."""
 _log = logging.getLogger(__name__)
 
@@ -59,43 +59,10 @@ def write_arrays(path: Path, **arrays: Any) -> None:
         _log.warning("%s cannot be written (%s), so the next start makes its content again", path, error)
 
 
-def in_file(path: Path, field: Field) -> Field:
-    """The same field, whose grids are mapped from a file, which is written if it is missing or has another content.
-
-    So they are memory that the system can take back at any time, and that all processes with the same object share.
-    Where no file can be written, the grids stay in memory.
-    """
-    grids = np.stack([field.distance.view(np.int32), field.triangle])
-    mapped = _mapped(path, grids)
-    if mapped is None:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with replacing(path) as file:
-                np.save(file, grids)
-            _remove_oldest(path.parent)
-            mapped = _mapped(path, grids)
-        except OSError as error:
-            _log.info("%s cannot be written (%s), so its content stays in memory", path, error)
-    grids = grids if mapped is None else mapped
-    return field._replace(distance=grids[0].view(np.float32), triangle=grids[1])
-
-
-def _mapped(path: Path, content: np.ndarray) -> np.ndarray | None:
-    """The array in a file, which is read when it is used; None if the file cannot be read or has another `content`."""
-    try:
-        with suppress(OSError):
-            os.utime(path)
-        mapped = np.asarray(np.load(path, mmap_mode="c", allow_pickle=False))  # private: nothing is written back
-    except (OSError, EOFError, ValueError):
-        return None
-    is_like_it = mapped.dtype == content.dtype and mapped.flags.c_contiguous
-    return mapped if is_like_it and np.array_equal(mapped, content) else None
-
-
 def _remove_oldest(folder: Path) -> None:
     """Delete the files that were used longest ago, as far as the folder is too large."""
     files: list[tuple[float, int, Path]] = []
-    for path in folder.glob("*.np[yz]*"):  # also what a process that was killed has written in part
+    for path in folder.glob("*.npz*"):  # also what a process that was killed has written in part
         with suppress(OSError):  # another process has just deleted it
             stat = path.stat()
             files.append((stat.st_mtime, stat.st_size, path))
