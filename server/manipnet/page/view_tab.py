@@ -93,8 +93,9 @@ class ViewTab:
 
     def _switch_theme(self) -> None:
         self._dark = not self._dark
-        self._apply_theme()
+        # kept first: whoever sees the theme may reload the page at once
         self._client.local_storage.set_item(THEME, "dark" if self._dark else "light")
+        self._apply_theme()
 
     def remember(self) -> None:
         """Use the theme that this browser used before; waits for its answer."""
