@@ -41,7 +41,7 @@ class SecondLines:
     def next(self, now_s: float) -> Second:
         """The rate and the delay since the last call, both hands of each actor, and what is down.
 
-        Call this about once per second, with the time. The first hands are counted, and have no rate yet.
+        Call this about once per second, with the time. The first hands have no rate yet.
 
         A hand whose state flickers is not a change until the state has lasted for a second.
         """
@@ -56,7 +56,7 @@ class SecondLines:
             return [WAITING]
         hands = [f"{self._name(actor)}{', '.join(map(_hand, actor.hands.values()))}" for actor in self._actors]
         if before == 0:
-            return [f"{self._messages} hands so far", *hands]
+            return ["the first hands are out", *hands]
         look_ahead_s = max(actor.look_ahead_s for actor in self._actors)
         rate_hz = (self._messages - before) / passed_s
         return [f"{rate_hz:.0f} hands/s", f"delay {1e3 * (look_ahead_s + p50_s):.0f} ms", *hands]

@@ -137,5 +137,8 @@ class TickLoop:
 
 
 def second_after(now_s: float, deadline_s: float) -> float:
-    """The first deadline to come of those one second apart; the ones that passed in a long tick are left out."""
-    return deadline_s + 1.0 + math.floor(now_s - deadline_s)
+    """The next of the deadlines one second apart that is half a second away or more, also after a long tick.
+
+    What is counted over less time says little as a rate.
+    """
+    return deadline_s + 1.0 + math.floor(now_s - deadline_s + 0.5)
